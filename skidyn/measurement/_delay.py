@@ -123,8 +123,9 @@ def find_delay(fits: Fits) -> Delay:
     if not beyond and not late_runs:
         return near
     far, *_ = _delay_within(fits, FAR_LAGS)
+    runs = {**far.runs, **near.runs} if late_runs else near.runs
     if not beyond:  # only single recordings are
-        return replace(near, runs=far.runs)
+        return replace(near, runs=runs)
     if beyond > MOST_BEYOND * fits.n_joints:
         return replace(far, runs={})  # these lags are too far apart for single recordings
     only_far = ~np.isfinite(near.joints) & np.isfinite(far.joints)
@@ -135,7 +136,7 @@ def find_delay(fits: Fits) -> Delay:
         gains=np.where(only_far, far.gains, near.gains),
         halves=np.where(only_far[:, None], far.halves, near.halves),
         drifts=np.where(only_far, far.drifts, near.drifts),
-        runs=far.runs if late_runs else near.runs,
+        runs=runs,
     )
 
 
@@ -163,11 +164,8 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
             continue
         own = np.column_stack([_own_columns(s, j), _of_position(s, j)])
         felt = regressor[use, j]
-        columns = np.column_stack([felt, _by_recording(felt, run_of[use]), fits.average(own)[use]])
-        columns = columns[:, np.abs(columns).max(axis=0) > 0]
-        columns = columns / np.linalg.norm(columns, axis=0)
-        basis, values, _ = np.linalg.svd(columns, full_matrices=False)
-        basis = basis[:, values > 1e-6 * values[0]]
+        columns = np.column_stack([felt, fits.average(own)[use]])
+        basis = _basis(np.column_stack([columns, _by_recording(felt, run_of[use])]))
         if basis.shape[1] > 0.5 * len(basis):
             continue
         y = np.stack([torque[use, j] for torque in shifted], axis=1)
@@ -181,7 +179,8 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
             beyond += 1
             continue
         tables.append((len(rest), errors))
-        for run, cost in _run_costs(basis, y, run_of[use]):
+        # a load of a recording would follow part of its own lag
+        for run, cost in _run_costs(_basis(columns), y, run_of[use]):
             squares.setdefault(run, []).append(cost)
             counts[run] = counts.get(run, 0) + int(np.sum(run_of[use] == run))
         sooner = rest * first[use][:, None]
@@ -414,6 +413,13 @@ def _own_columns(signals: Signals, joint: int) -> Array:
     """Columns of a joint in addition to those of the bodies."""
     ones = np.ones(signals.n_samples)
     return np.column_stack([friction(signals, joint), _bent_friction(signals, joint), ones])
+
+
+def _basis(columns: Array) -> Array:
+    """Orthonormal columns that span the same."""
+    columns = columns[:, np.abs(columns).max(axis=0) > 0]
+    basis, values, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+    return np.asarray(basis[:, values > 1e-6 * values[0]])
 
 
 def _by_recording(regressor: Array, run_of: Array) -> Array:
