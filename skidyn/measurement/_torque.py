@@ -51,6 +51,8 @@ APART, SAME = 0.008, 0.3
 #: Fewest other joints of known lag to compare with it, in robots that have as many, and the largest
 #: lag of these, as a share of it, if it is more than the smallest that is reported.
 FEWEST_SURE, LITTLE = 2, 0.2
+#: Log-likelihood that the lag of a single joint must gain; an unknown effect may look like one.
+ALONE = 60.0
 
 
 #: Share of the recordings that may be late by themselves, and log-likelihood that they must gain:
@@ -632,7 +634,7 @@ def late_joints(found: Delay) -> list[int]:
         apart = abs(lag - common) > max(APART, ERRORS * found.errors[k])
         apart &= abs(common) < max(SMALLEST, LITTLE * abs(lag))
         slow, fast = found.halves[k]
-        if apart and found.gains[k] > SURE and abs(slow - fast) < SAME * abs(lag):
+        if apart and found.gains[k] > ALONE and abs(slow - fast) < SAME * abs(lag):
             late.append(k)
     return late if len(late) < len(found.joints) / 2 or len(found.joints) == 2 else []
 
