@@ -56,6 +56,8 @@ class RunDelay:
         The same at the lag of the other recordings.
     usual : float, s
         Lag of the other recordings.
+    joints : int
+        Number of joints whose own lag is close to it.
     """
 
     lag: float
@@ -65,6 +67,7 @@ class RunDelay:
     left: float = 1.0
     before: float = 1.0
     usual: float = 0.0
+    joints: int = 0
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,9 @@ def find_delay(fits: Fits) -> Delay:
     if not beyond and not late_runs:
         return near
     far, *_ = _delay_within(fits, FAR_LAGS)
-    runs = {**far.runs, **near.runs} if late_runs else near.runs
+    # a single joint, with few rows, may have any lag
+    later = {run: one for run, one in far.runs.items() if late_runs and one.joints > 1}
+    runs = {**later, **near.runs}
     if not beyond:  # only single recordings are
         return replace(near, runs=runs)
     if beyond > MOST_BEYOND * fits.n_joints:
@@ -282,7 +287,8 @@ def _of_runs(
         agreeing = float(weight[near].sum()) / total
         left, before = (np.sqrt(2 * float(whole[run][x]) / counts[run]) for x in (there, here))
         found[run] = RunDelay(
-            lag - usual, error, float(gains.sum()), agreeing, float(left), float(before), usual
+            *(lag - usual, error, float(gains.sum()), agreeing, float(left), float(before), usual),
+            int(np.sum(near & (gains > 0))),
         )
     return found, beyond
 
