@@ -37,7 +37,8 @@ UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
 #: Smallest delay that is reported, s, how many standard errors it must have, and how far the lag of
 #: a joint may be from it.
 SMALLEST, ERRORS, ALIKE = 0.004, 5.0, 0.006
-#: The same with positions in coarse steps.
+#: The same with positions in coarse steps, whose lag must gain as much as to be sure: their errors
+#: are not independent from row to row.
 SMALLEST_COARSE = 0.01
 #: How many standard errors lags in the halves of recordings must differ by: that there is a lag is
 #: known then.
@@ -449,7 +450,7 @@ class TorqueDelay(Check):
             return
         if (
             abs(found.common) > max(SMALLEST, ERRORS * found.error)
-            and found.gain > LEAST
+            and found.gain > (SURE if measurement.coarse else LEAST)
             and abs(found.common) > _least_lag(measurement)
             # a low pass delays faster motion less
             and (agreeing or _agree(found, use)[0])

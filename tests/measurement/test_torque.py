@@ -72,3 +72,10 @@ def test_loads_of_single_recordings_do_not_hide_the_lag_of_a_joint(arm, told_of)
     late = log.frame.groupby("trajectory")["tau2"].shift(3).bfill()
     told = told_of(log.frame.assign(tau2=late))["torque_delay"]
     assert told.joints == (2,) and told.remedy.option.startswith("--late tau2=0.0")
+
+
+def test_coarse_positions_are_not_late(arm, told_of):
+    log = make_hidden_effect_log(arm, None, n_trajectories=5, duration=6.0, random_state=7431219)
+    step = 2 * np.pi / 4096
+    coarse = {name: np.round(log.frame[name] / step) * step for name in ("q1", "q2")}
+    assert "torque_delay" not in told_of(log.frame.assign(**coarse))
