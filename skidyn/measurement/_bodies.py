@@ -239,12 +239,12 @@ class TorqueScale(Check):
         if far or any(_unit_like(gain) == KILO for gain in found.values()):
             far |= set(reached)
         beyond = {k: times for k, times in reached.items() if k in far and k not in found}
-        for k, times in reached.items():
+        for k, multiple in reached.items():
             if k not in far and k not in known and k not in found:
                 yield self.suspicion(
                     f"either the torque of {measurement.joint(k)} is in another unit, or its "
                     "effort limit in the description is wrong",
-                    f"it reaches {times:.3g} times that limit; the bodies that it moves do not "
+                    f"it reaches {multiple:.3g} times that limit; the bodies that it moves do not "
                     "determine its scale",
                     "noted",
                     [k],

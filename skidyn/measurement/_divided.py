@@ -358,8 +358,10 @@ def _likelihoods(
                 for g in groups
             ]
         )
-        every = [np.broadcast_to(x, (len(groups), len(x))) for x in (y, use)]
-        after = [fit.likelihood for fit in fit_at_once(columns, *every)]
+        count = (len(groups), 1)
+        after = [
+            fit.likelihood for fit in fit_at_once(columns, np.tile(y, count), np.tile(use, count))
+        ]
         total += (np.array(after) - before) / known.inflation_of(k)
     return total
 
