@@ -17,7 +17,7 @@ from scipy.sparse import csr_matrix
 from skidyn._cores import each
 from skidyn._progress import tell
 from skidyn._signals import Array, Signals
-from skidyn.effects import Term, TermSum
+from skidyn.effects import Term, TermSum, get_effect
 from skidyn.evidence._broken import without_broken
 from skidyn.evidence._folds import RIDGE, Normal, nearest_folds
 from skidyn.evidence._kinematics import smooth_motion
@@ -135,9 +135,10 @@ class Problem:
 
     def term_rows(self, term: Term) -> dict[int, Array]:
         """Averaged columns of a term, per joint on which it acts."""
-        if term not in self._cache:
-            self._cache[term] = self._averaged(term, self._step(term))
-        return self._cache[term]
+        rows = self._cache.get(term)
+        if rows is None:
+            rows = self._cache[term] = self._averaged(term, self._step(term))
+        return rows
 
     def screening_rows(self, term: Term) -> dict[int, Array]:
         """As :meth:`term_rows`, but of an unknown function from only as many samples as needed.
@@ -404,7 +405,8 @@ class Problem:
             smooth_torque=lambda: torques()[1],
             inertial_parameters=self.inertial_parameters(fit),
         )
-        self._cache = {t: rows for t, rows in self._cache.items() if not t.effect.follows_fit}
+        following = {k for k in {t.kind for t in self._cache} if get_effect(k).follows_fit}
+        self._cache = {t: rows for t, rows in self._cache.items() if t.kind not in following}
 
 
 class _Torques:
