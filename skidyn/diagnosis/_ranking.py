@@ -161,11 +161,8 @@ class RankingSearch(SearchState):
         pool, errors, model, now = wanted.copy(), first, base, base.errors
         index: list[int] = []
         chosen: list[Candidate] = []
-        widths = np.array([c.width for c in self.pool])
         # A further form was chosen from all possible ones, so it must be better by this much.
-        further = self.settings.least_gain * np.array(
-            [c.is_further_form for c in self.pool], dtype=float
-        )
+        further = self.settings.least_gain * screen.further_forms
         while pool.any():
             drops = np.where(pool, now.sum() - errors.sum(1), -np.inf)
             # Unknown functions have very different numbers of coefficients: each coefficient has a
@@ -173,7 +170,8 @@ class RankingSearch(SearchState):
             price = 2.0
             if self.pool[int(np.argmax(drops))].kind == UNKNOWN:
                 price = self._price([self.pool[int(np.argmax(drops))]], chosen) / 3
-            found = self._first_significant(drops, drops - price * widths - further, tester)
+            order = drops - price * screen.widths - further
+            found = self._first_significant(drops, order, tester)
             if found is None:
                 break
             candidate = self.pool[found]
@@ -204,15 +202,11 @@ class RankingSearch(SearchState):
         if len(added.joints) == self.problem.n_joints and self.problem.n_joints > 1:
             return np.zeros(len(self.pool), dtype=bool)  # acts on the whole robot already
         if added.kind == UNKNOWN:
-            same = {added.variables}
+            same = set(added.variables)
             if len(chosen) >= 3:
                 return np.zeros(len(self.pool), dtype=bool)
             return np.array(
-                [
-                    set(c.variables) == set(v) and c.joints != added.joints
-                    for c in self.pool
-                    for v in same
-                ]
+                [c.joints != added.joints and set(c.variables) == same for c in self.pool]
             )
         taken = {c.joints for c in chosen}
         whole = self.problem.n_joints > 1
