@@ -208,8 +208,9 @@ class _LinkSideEffect(Effect):
         moves = self.moves(signals, joint, **shape)
         slopes = [_slope(signals, joint, by) for by in ("position", "velocity", "acceleration")]
         change = np.zeros((signals.n_joints, signals.n_samples))
+        product = np.empty_like(change)
         for slope, move in zip(slopes, moves, strict=True):
-            change -= slope * move
+            change -= np.multiply(slope, move, out=product)
         return {j: own[:, None] for j, own in enumerate(change)}
 
 
