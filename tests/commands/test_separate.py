@@ -4,18 +4,8 @@
 from __future__ import annotations
 
 import pandas as pd
-import pytest
 
 from skidyn import cli
-
-
-@pytest.fixture(scope="module")
-def report(work):
-    pytest.importorskip("jinja2", reason="needs skidyn[report]")
-    path = work / "separate.json"
-    words = ["diagnose", work / "log.csv", "--urdf", work / "arm.urdf", "--out", path]
-    assert cli.main([*map(str, words)]) == cli.DONE
-    return path
 
 
 def test_the_motion_and_its_worth(report, run, tmp_path):
