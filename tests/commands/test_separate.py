@@ -8,7 +8,9 @@ import pandas as pd
 from skidyn import cli
 
 
-def test_the_motion_and_its_worth(report, run, tmp_path):
+def test_the_motion_and_its_worth(report, run, tmp_path, monkeypatch):
+    # the best motion is a matter of its own test
+    monkeypatch.setattr("skidyn.diagnosis._separation.ROUNDS", 2)
     out = tmp_path / "motion.csv"
 
     code, answer = run("separate", "--from", report, "--out", out, "--duration", 10)
