@@ -71,28 +71,40 @@ def split_effects(
     if problem.robot is None or len(names) < 2:
         return []
     y = [t / s for t, s in zip(target, sigma, strict=True)]
+    joints = tuple(range(problem.n_joints))
+    model = felt_columns(problem, blocks, sigma)
     found = []
     for kind in kinds:
         effect = get_effect(kind)
         if effect.search != "trajectories":
             continue
-        term = Term.at(kind, tuple(range(problem.n_joints)))
-        rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
-        products = _Products.of(problem, felt_columns(problem, blocks, sigma), y, rows, names)
-        own = products.own_estimates(effect.leading or term.width)
-        groups = _splits(effect.grows, own, names)
-        alone = {name: products.drop(names == name) for name in {n for g in groups for n in g}}
-        together = [(products.drop(np.isin(names, group)), group) for group in groups]
-        # Separate sizes in most recordings can be due to any missing slow torque.
-        few = [group for group in groups if 3 * len(group) <= 2 * len(names)]
-        apart = [(np.sum([alone[name] for name in group], axis=0), group) for group in few]
-        for drops, is_apart in ((together, False), (apart, True)):
-            if not drops:
-                continue
-            drop, chosen = max(drops, key=lambda item: float(item[0].sum()))
-            split = term.with_shape(trajectories=tuple(sorted(int(name) for name in chosen)))
-            rows = rows_within(problem, problem.term_rows(term), chosen)
-            found.append(Split(Candidate(kind, split, rows), drop, is_apart))
+        for shape in effect.grid(problem.few, joints):
+            term = Term.at(kind, joints, shape)
+            rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
+            products = _Products.of(problem, model, y, rows, names)
+            found += _best_splits(problem, term, products, names)
+    return found
+
+
+def _best_splits(
+    problem: Problem, term: Term, products: _Products, names: NDArray[Any]
+) -> list[Split]:
+    """The best split for the same effect in its trajectories, and that for separate sizes."""
+    own = products.own_estimates(term.effect.leading or term.width)
+    groups = _splits(term.effect.grows, own, names)
+    alone = {name: products.drop(names == name) for name in {n for g in groups for n in g}}
+    together = [(products.drop(np.isin(names, group)), group) for group in groups]
+    # Separate sizes in most recordings can be due to any missing slow torque.
+    few = [group for group in groups if 3 * len(group) <= 2 * len(names)]
+    apart = [(np.sum([alone[name] for name in group], axis=0), group) for group in few]
+    found = []
+    for drops, is_apart in ((together, False), (apart, True)):
+        if not drops:
+            continue
+        drop, chosen = max(drops, key=lambda item: float(item[0].sum()))
+        split = term.with_shape(trajectories=tuple(sorted(int(name) for name in chosen)))
+        rows = rows_within(problem, problem.term_rows(term), chosen)
+        found.append(Split(Candidate(term.kind, split, rows), drop, is_apart))
     return found
 
 
