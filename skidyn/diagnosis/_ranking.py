@@ -173,7 +173,7 @@ class RankingSearch(SearchState):
             price = 2.0
             if self.pool[int(np.argmax(drops))].kind == UNKNOWN:
                 price = self._price([self.pool[int(np.argmax(drops))]], chosen) / 3
-            found = self._first_significant(drops, drops - price * widths - further, tester)
+            found = self._first_significant(drops, drops - price * widths - further, tester, chosen)
             if found is None:
                 break
             candidate = self.pool[found]
@@ -187,17 +187,33 @@ class RankingSearch(SearchState):
                 tester = self.tester([*self.chosen, *chosen])
         return index, float(base.errors.sum() - now.sum())
 
-    def _first_significant(self, drops: Array, order: Array, tester: Tester) -> int | None:
-        """The first of the best few candidates that is large enough and significant."""
+    def _first_significant(
+        self, drops: Array, order: Array, tester: Tester, chosen: Sequence[Candidate]
+    ) -> int | None:
+        """The first of the best few candidates that is large enough and significant.
+
+        Between the shapes of the grid lie others, such as planes of other directions, that remove
+        more: if none is significant among all that were tried, the first that is by itself is
+        tested with its shape refined, as it will be judged later.
+        """
+        near = None
         for i in np.argsort(-order)[: self.settings.shapes_tested]:
             candidate = self.pool[i]
             n_rows = int(self.problem.rows.counts[list(candidate.joints)].sum())
             if not drops[i] > self.settings.least_share * n_rows:
                 continue
             passes = partial(self.significant, candidate=candidate)
-            if passes(tester.test(candidate.rows, candidate.zeros, passes).chance):
+            chance = tester.test(candidate.rows, candidate.zeros, passes).chance
+            if passes(chance):
                 return int(i)
-        return None
+            if near is None and candidate.n_shapes and chance < self.settings.level:
+                near = int(i)
+        if near is None:
+            return None
+        model = self.blocks_with([*self.chosen, *chosen])
+        (refined,) = refine(self.problem, model, [self.pool[near]], self.sigma, self.target)
+        chance = tester.test(refined.rows, refined.zeros).chance
+        return near if self.significant(chance, refined) else None
 
     def _still_open(self, added: Candidate, chosen: list[Candidate]) -> Mask:
         """Candidates that may be added to one of the same kind."""
