@@ -240,10 +240,10 @@ class RankingSearch(SearchState):
         )
 
     def _splits(self) -> list[tuple[list[Candidate], float]]:
-        """Payloads and tool forces of some trajectories, once."""
-        if any(c.term.effect.search == "trajectories" for c in self.chosen):
-            return []
-        splits = split_effects(self.problem, self.kinds, self.blocks, self.sigma, self.target)
+        """Payloads and tool forces of some trajectories."""
+        splits = split_effects(
+            self.problem, self.kinds, self.blocks, self.sigma, self.target, self.chosen
+        )
         found = []
         for split in splits:
             if split.drop.sum() > 0:
@@ -262,8 +262,14 @@ class RankingSearch(SearchState):
         tester = self.tester(self.chosen)
         if tester.test(candidate.rows).coefficients[0] >= 0:
             return candidate
+        loaded = {
+            k
+            for c in [*self.chosen, candidate]
+            if c.kind == candidate.kind
+            for k in c.term.trajectories or ()
+        }
         names = self.problem.rows.recordings.tolist()
-        rest = tuple(name for name in names if name not in candidate.term.trajectories)
+        rest = tuple(name for name in names if name not in loaded)
         term = candidate.term.with_shape(trajectories=rest)
         other = replace(candidate, term=term, rows=self.problem.term_rows(term))
         return other if tester.test(other.rows).coefficients[0] > 0 else candidate

@@ -45,3 +45,28 @@ def test_a_force_beside_the_origin_of_the_tool_is_told_with_its_moment_and_frame
     np.testing.assert_allclose(told, wrench, atol=0.2)
     assert all(f"{name} = " in found.sentence for name in names[:3])
     assert ("turns with the tool" in found.sentence) == bool(frame)
+
+
+def test_another_load_is_one_of_other_recordings():
+    log = make_hidden_effect_log(
+        load_panda(), None, noise="low", n_trajectories=9, duration=4.0, random_state=0
+    )
+    X, torque = log.X, log.y.copy()
+    motion = [X[[f"{name}{j + 1}" for j in range(7)]].to_numpy() for name in ("q", "dq", "ddq")]
+    load = np.array([1.0, 0.02, 0.0, 0.05, 0.003, 0.0, 0.0, 0.003, 0.0, 0.001])
+    loads = {(1, 4): 0.9, (6, 7): 0.4}  # kg
+    for recordings, mass in loads.items():
+        bodies = log.robot.inertial_parameters.copy()
+        change = -log.robot.inverse_dynamics(*motion, parameters=bodies)
+        bodies[-1] += mass * load
+        change += log.robot.inverse_dynamics(*motion, parameters=bodies)
+        own = X["trajectory"].isin(recordings).to_numpy()
+        torque[own] += change[own]
+
+    found = diagnose(RBDRegressor(log.robot), X, torque).findings
+
+    assert {f.trajectories for f in found if f.kind == "payload"} == set(loads)
+    for finding in found:
+        assert finding.parameters["mass"]["value"] == pytest.approx(
+            loads[finding.trajectories], rel=0.05
+        )
