@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A further search without the beginnings of recordings, in which links may swing already.
+
+A link on an elastic gear that is in motion when a recording begins oscillates at first in a way
+that no logged signal predicts: that of its motion before. If an oscillating link is among the
+findings, its oscillation decays within seconds. The search is repeated without them, and its result
+counts if its model fails much more in the beginnings than later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn._text import joints_told
+from skidyn.diagnosis._hypothesis import SearchResult
+from skidyn.diagnosis._rule import BEGINNING_DAMPING, BEGINNING_LEFT, BEGINNING_STANDS_OUT
+from skidyn.evidence import Problem, with_reversals
+
+#: Result of the first search, the problem of the closer ones, and their result.
+Searched = tuple[SearchResult, Problem, SearchResult]
+
+
+def look_after_beginnings(
+    problem: Problem, searched: Searched, search: Callable[[Problem], Searched]
+) -> tuple[Problem, Searched, str]:
+    """Search again without the beginnings of recordings if a link was found to swing.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem of all samples.
+    searched : tuple of SearchResult, Problem and SearchResult
+        What was found in it.
+    search : callable
+        All searches in a problem.
+
+    Returns
+    -------
+    problem : Problem
+        Problem without the beginnings if links swing there, else as given.
+    searched : tuple of SearchResult, Problem and SearchResult
+        What was found in it.
+    note : str
+        What was left out, and why; empty if nothing was.
+    """
+    swing = _slowest_swing(searched)
+    if not swing or problem.signals.time is None:
+        return problem, searched, ""
+    length = BEGINNING_LEFT / (2 * np.pi * BEGINNING_DAMPING * swing)
+    early = beginnings(problem, length)
+    signals = problem.signals
+    settled = signals.with_(valid=signals.usable & ~early[:, None])
+    later = with_reversals(replace(problem, signals=settled), problem.terms, ())
+    if not later.rows.counts.any():
+        return problem, searched, ""
+    found = search(later)
+    joints = _swinging(found)
+    if not joints:
+        return problem, searched, ""
+    _, wider, completed = found
+    left = wider.torque - completed.ripple - wider.explained(completed.fit)
+    sliding = problem.rows.sliding
+    early_error = _mean_squares(left, sliding & early[:, None])
+    later_error = _mean_squares(left, later.rows.sliding)
+    ratio = early_error / np.maximum(later_error, np.finfo(float).tiny)
+    joints = [j for j in joints if ratio[j] > BEGINNING_STANDS_OUT]
+    if not joints:
+        return problem, searched, ""
+    where = joints_told(j + 1 for j in joints)
+    note = (
+        f"The first {length:.1f} s of the recordings are not judged: {where} swings there already "
+        f"when a recording begins, with up to {np.sqrt(ratio[joints].max()):.1f} times the error "
+        "of later motion, which no logged signal predicts. Begin recordings at rest to use them."
+    )
+    return later, found, note
+
+
+def beginnings(problem: Problem, length: float) -> NDArray[np.bool_]:
+    """Samples in the first seconds of the recordings, but in no more than half of each.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem with a clock.
+    length : float, s
+        How long a beginning is.
+
+    Returns
+    -------
+    ndarray of shape (n_samples,) of bool
+    """
+    clock, trajectory = problem.signals.clock, problem.signals.trajectory
+    early = np.zeros(len(clock), dtype=bool)
+    for name in np.unique(trajectory):
+        own = np.flatnonzero(trajectory == name)
+        since = clock[own] - clock[own].min()
+        early[own] = since < min(length, since.max() / 2)
+    return early
+
+
+def _slowest_swing(searched: Searched) -> float:
+    """Lowest resonance of the links that were found to swing, Hz; 0 without one."""
+    first, _, last = searched
+    terms = [c.term for h in (*first.findings, *last.findings) for c in h.candidates]
+    swings = [term.effect.fastest(term.shape) for term in terms]
+    return min(filter(None, swings), default=0.0)
+
+
+def _swinging(searched: Searched) -> list[int]:
+    """Joints, from 0, whose link swings."""
+    candidates = [c for h in searched[2].findings for c in h.candidates]
+    return sorted({j for c in candidates if c.term.effect.fastest(c.term.shape) for j in c.joints})
+
+
+def _mean_squares(values: Array, use: NDArray[np.bool_]) -> Array:
+    """Mean square of every joint on the samples that are used; 0 without any."""
+    total = np.sum(np.where(use, values**2, 0.0), axis=0)
+    return np.asarray(total / np.maximum(use.sum(axis=0), 1))
