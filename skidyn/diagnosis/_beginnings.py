@@ -2,9 +2,9 @@
 """A further search without the beginnings of recordings, in which links may swing already.
 
 A link on an elastic gear that is in motion when a recording begins oscillates at first in a way
-that no logged signal predicts: that of its motion before. If an oscillating link is among the
-findings, its oscillation decays within seconds. The search is repeated without them, and its result
-counts if its model fails much more in the beginnings than later.
+that no logged signal predicts: that of its motion before. This decays within seconds. If a link
+that oscillates was found, or the model fails more in the beginnings than later, the search is
+repeated without them. Its result counts if it finds such a link, and fails in the beginnings.
 """
 
 from __future__ import annotations
@@ -18,7 +18,12 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn._text import joints_told
 from skidyn.diagnosis._hypothesis import SearchResult
-from skidyn.diagnosis._rule import BEGINNING_DAMPING, BEGINNING_LEFT, BEGINNING_STANDS_OUT
+from skidyn.diagnosis._rule import (
+    BEGINNING_DAMPING,
+    BEGINNING_LEFT,
+    BEGINNING_RESONANCE,
+    BEGINNING_STANDS_OUT,
+)
 from skidyn.evidence import Problem, with_reversals
 
 #: Result of the first search, the problem of the closer ones, and their result.
@@ -28,7 +33,7 @@ Searched = tuple[SearchResult, Problem, SearchResult]
 def look_after_beginnings(
     problem: Problem, searched: Searched, search: Callable[[Problem], Searched]
 ) -> tuple[Problem, Searched, str]:
-    """Search again without the beginnings of recordings if a link was found to swing.
+    """Search again without the beginnings of recordings if a link may swing there.
 
     Parameters
     ----------
@@ -48,27 +53,23 @@ def look_after_beginnings(
     note : str
         What was left out, and why; empty if nothing was.
     """
-    swing = _slowest_swing(searched)
-    if not swing or problem.signals.time is None:
+    if problem.signals.time is None:
         return problem, searched, ""
-    length = BEGINNING_LEFT / (2 * np.pi * BEGINNING_DAMPING * swing)
-    early = beginnings(problem, length)
+    swing = _slowest_swing(searched)
+    length = BEGINNING_LEFT / (2 * np.pi * BEGINNING_DAMPING * (swing or BEGINNING_RESONANCE))
+    early = beginnings(problem, length)[:, None]
+    sliding = problem.rows.sliding
+    fails = _standing_out(searched, sliding & early, sliding & ~early) > BEGINNING_STANDS_OUT
+    if not swing and not fails.any():
+        return problem, searched, ""
     signals = problem.signals
-    settled = signals.with_(valid=signals.usable & ~early[:, None])
+    settled = signals.with_(valid=signals.usable & ~early)
     later = with_reversals(replace(problem, signals=settled), problem.terms, ())
     if not later.rows.counts.any():
         return problem, searched, ""
     found = search(later)
-    joints = _swinging(found)
-    if not joints:
-        return problem, searched, ""
-    _, wider, completed = found
-    left = wider.torque - completed.ripple - wider.explained(completed.fit)
-    sliding = problem.rows.sliding
-    early_error = _mean_squares(left, sliding & early[:, None])
-    later_error = _mean_squares(left, later.rows.sliding)
-    ratio = early_error / np.maximum(later_error, np.finfo(float).tiny)
-    joints = [j for j in joints if ratio[j] > BEGINNING_STANDS_OUT]
+    ratio = _standing_out(found, sliding & early, later.rows.sliding)
+    joints = [j for j in _swinging(found) if ratio[j] > BEGINNING_STANDS_OUT]
     if not joints:
         return problem, searched, ""
     where = joints_told(j + 1 for j in joints)
@@ -107,14 +108,20 @@ def _slowest_swing(searched: Searched) -> float:
     """Lowest resonance of the links that were found to swing, Hz; 0 without one."""
     first, _, last = searched
     terms = [c.term for h in (*first.findings, *last.findings) for c in h.candidates]
-    swings = [term.effect.fastest(term.shape) for term in terms]
-    return min(filter(None, swings), default=0.0)
+    return min(filter(None, (term.effect.fastest(term.shape) for term in terms)), default=0.0)
 
 
 def _swinging(searched: Searched) -> list[int]:
     """Joints, from 0, whose link swings."""
     candidates = [c for h in searched[2].findings for c in h.candidates]
     return sorted({j for c in candidates if c.term.effect.fastest(c.term.shape) for j in c.joints})
+
+
+def _standing_out(searched: Searched, early: NDArray[np.bool_], later: NDArray[np.bool_]) -> Array:
+    """Mean square of what is left early over that later, by joint."""
+    _, problem, result = searched
+    left = problem.torque - result.ripple - problem.explained(result.fit)
+    return np.asarray(_mean_squares(left, early) / (_mean_squares(left, later) + 1e-300))
 
 
 def _mean_squares(values: Array, use: NDArray[np.bool_]) -> Array:

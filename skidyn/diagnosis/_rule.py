@@ -126,9 +126,10 @@ REVERSAL_FEWEST_ROWS, REVERSAL_AWAY = 20, 0.6
 REVERSAL_LEAST_SHARE = 0.06
 
 #: A link that swings when a recording begins (``_beginnings.py``): damping ratio and share of the
-#: oscillation that determine how long it is left out (gears have ratios of .02 to .1), and squared
-#: error of the beginnings over that of later motion from which they are.
-BEGINNING_DAMPING, BEGINNING_LEFT = 0.02, float(np.log(10.0))
+#: oscillation that determine how long it is left out (gears have ratios of .02 to .1), its
+#: resonance, Hz, if none is known yet, and squared error of the beginnings over that of later
+#: motion from which they are left out.
+BEGINNING_DAMPING, BEGINNING_LEFT, BEGINNING_RESONANCE = 0.02, float(np.log(10.0)), 9.0
 BEGINNING_STANDS_OUT = 2.0
 
 #: Windows, in s, for effects that move the link (``_swift.py``): crossing a play of a few mrad
