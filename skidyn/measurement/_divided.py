@@ -358,8 +358,9 @@ def _likelihoods(
                 for g in groups
             ]
         )
-        every = [np.broadcast_to(x, (len(groups), len(x))) for x in (y, use)]
-        after = [fit.likelihood for fit in fit_at_once(columns, *every)]
+        shape = len(groups), len(y)
+        fitted = fit_at_once(columns, np.broadcast_to(y, shape), np.broadcast_to(use, shape))
+        after = [fit.likelihood for fit in fitted]
         total += (np.array(after) - before) / known.inflation_of(k)
     return total
 

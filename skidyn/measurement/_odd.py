@@ -93,15 +93,15 @@ class OddRecording(Check):
             measurement.odd = True
             return
         exchanged = list(find_exchanges(seen))
-        for one in exchanged:
+        for pair in exchanged:
             measurement.odd = True
-            names = " and ".join(measurement.joint(k) for k in one.joints)
+            names = " and ".join(measurement.joint(k) for k in pair.joints)
             yield self.suspicion(
-                f"in trajectory {one.run} the torques of {names} are exchanged",
+                f"in trajectory {pair.run} the torques of {names} are exchanged",
                 "each is what the other trajectories predict for the other joint, which improves "
-                f"the fit by {one.gain:.0f} (log-likelihood); fix that file, or leave it out",
+                f"the fit by {pair.gain:.0f} (log-likelihood); fix that file, or leave it out",
                 "suspected",
-                one.joints,
+                pair.joints,
             )
         if exchanged:
             return
