@@ -19,6 +19,7 @@ from skidyn._signals import Array
 from skidyn._text import joints_told
 from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._rule import (
+    BEGINNING_ALIKE,
     BEGINNING_DAMPING,
     BEGINNING_LEFT,
     BEGINNING_RESONANCE,
@@ -56,27 +57,32 @@ def look_after_beginnings(
     if problem.signals.time is None:
         return problem, searched, ""
     swing = _slowest_swing(searched)
-    length = BEGINNING_LEFT / (2 * np.pi * BEGINNING_DAMPING * (swing or BEGINNING_RESONANCE))
-    early = beginnings(problem, length)[:, None]
-    sliding = problem.rows.sliding
-    fails = _standing_out(searched, sliding & early, sliding & ~early) > BEGINNING_STANDS_OUT
-    if not swing and not fails.any():
-        return problem, searched, ""
-    signals = problem.signals
-    settled = signals.with_(valid=signals.usable & ~early)
-    later = with_reversals(replace(problem, signals=settled), problem.terms, ())
-    if not later.rows.counts.any():
-        return problem, searched, ""
-    found = search(later)
+    sliding, signals = problem.rows.sliding, problem.signals
+    for _ in range(2):  # again if the swing that is found is slower
+        length = BEGINNING_LEFT / (2 * np.pi * BEGINNING_DAMPING * (swing or BEGINNING_RESONANCE))
+        early = beginnings(problem, length)[:, None]
+        fails = _standing_out(searched, sliding & early, sliding & ~early) > BEGINNING_STANDS_OUT
+        if not swing and not fails.any():
+            return problem, searched, ""
+        settled = signals.with_(valid=signals.usable & ~early)
+        later = with_reversals(replace(problem, signals=settled), problem.terms, ())
+        if not later.rows.counts.any():
+            return problem, searched, ""
+        found = search(later)
+        slower = _slowest_swing(found)
+        if not slower or slower > BEGINNING_ALIKE * (swing or BEGINNING_RESONANCE):
+            break
+        swing = slower
     ratio = _standing_out(found, sliding & early, later.rows.sliding)
     joints = [j for j in _swinging(found) if ratio[j] > BEGINNING_STANDS_OUT]
     if not joints:
         return problem, searched, ""
     where = joints_told(j + 1 for j in joints)
     note = (
-        f"The first {length:.1f} s of the recordings are not judged: {where} swings there already "
-        f"when a recording begins, with up to {np.sqrt(ratio[joints].max()):.1f} times the error "
-        "of later motion, which no logged signal predicts. Begin recordings at rest to use them."
+        f"The first {length:.1f} s of the recordings, at most half of each, are not judged: {where} "
+        f"swings there already when a recording begins, with up to {np.sqrt(ratio[joints].max()):.1f} "
+        "times the error of later motion, which no logged signal predicts. Begin recordings at rest "
+        "to use them."
     )
     return later, found, note
 
