@@ -78,11 +78,12 @@ def look_after_beginnings(
     if not joints:
         return problem, searched, ""
     where = joints_told(j + 1 for j in joints)
+    times = float(np.sqrt(ratio[joints].max()))
     note = (
-        f"The first {length:.1f} s of the recordings, at most half of each, are not judged: {where} "
-        f"swings there already when a recording begins, with up to {np.sqrt(ratio[joints].max()):.1f} "
-        "times the error of later motion, which no logged signal predicts. Begin recordings at rest "
-        "to use them."
+        f"The first {length:.1f} s of the recordings, at most half of each, are not judged: "
+        f"{where} swings there already when a recording begins, with up to {times:.1f} times the "
+        "error of later motion, which no logged signal predicts. Begin recordings at rest to use "
+        "them."
     )
     return later, found, note
 
