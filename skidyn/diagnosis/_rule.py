@@ -126,6 +126,14 @@ REVERSAL_FEWEST_ROWS, REVERSAL_AWAY = 20, 0.6
 #: Least share of a joint's squared error that hysteresis must remove there.
 REVERSAL_LEAST_SHARE = 0.06
 
+#: A link that swings when a recording begins (``_beginnings.py``): damping ratio and share of the
+#: oscillation that determine how long it is left out (gears have ratios of .02 to .1), its
+#: resonance, Hz, if none is known yet, share of it below which it is another one, and squared error
+#: of the beginnings over that of later motion from which they are left out.
+BEGINNING_DAMPING, BEGINNING_LEFT, BEGINNING_RESONANCE = 0.02, float(np.log(10.0)), 9.0
+BEGINNING_ALIKE = 0.8
+BEGINNING_STANDS_OUT = 2.0
+
 #: Windows, in s, for effects that move the link (``_swift.py``): crossing a play of a few mrad
 #: takes as long.
 SHORT_WINDOW = 1 / 32

@@ -12,10 +12,13 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import Fits, Outcome, Reading, friction
+from skidyn.measurement._crosstalk import find_shares
+from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading, friction
 from skidyn.measurement._gains import Scales, refined_scales
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._robust import fit_admissible
+from skidyn.measurement._peak import peak
+from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, MOST_ROWS
+from skidyn.measurement._robust import ROUNDS, fit_admissible
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes, readable_fits
 
@@ -29,23 +32,32 @@ USUAL = (0.4, 2.5)
 CLEARLY = (0.62, 1.6)
 #: Multiples of an effort limit, and of the torque of the bodies, that only another unit reaches.
 FAR = 20.0
+#: Multiple of its effort limit that a joint cannot reach, beside one whose torque is in another
+#: unit: drives of a wrist report the same unit, and friction alone has no scale.
+WITH_ANOTHER = 1.5
 #: Largest standard error of a scale that is reported without confirmation by the stated bodies.
 TELLING = 0.15
 #: Largest ratio of the torques per ampere of drives of one robot.
 DRIVES = 20.0
 #: Rates of clock and velocities that are tried.
 RATES = (0.1, 0.2, 0.33, 0.5, 2.0, 3.0, 5.0, 10.0)
+#: Distance of the points of a parabola through the likelihood of the logarithm of a rate, how far
+#: identified bodies may move it, and how near it is to a whole multiple that is one.
+RATE_STEP, RATE_MOVES, RATE_WHOLE = 0.02, 0.2, 0.02
 AS_IT_IS = Reading()
 #: Factors of units of torque.
 UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
+#: That of torques beyond what their joints can have.
+KILO = 1e3
 #: Error with stated bodies, as a share of the spread, and as a multiple of that with identified
 #: ones, from which the stated ones are wrong; least share of the bodies in a torque.
 WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
 #: Error of any bodies, as a share of the spread, and in errors of the mean of a row, from which a
 #: torque is nearly unrelated to the motion.
 UNRELATED, BEYOND = 0.67, 4.0
-#: Least share of it that any function of the position must leave, and the nodes of such a function.
-LEFT, PLACES = 0.8, 8
+#: Least share of it that any function of the position must leave, the nodes of such a function, the
+#: fewest parts of a log that are predicted by the others, and the least share of it that can be.
+LEFT, PLACES, FEWEST_PARTS, MOSTLY = 0.8, 8, 3, 0.5
 #: Largest share of friction, and that of the joint in the middle, where there is none.
 FRICTIONLESS, HARDLY = 0.12, 0.05
 #: A computed torque: largest difference from that of the stated bodies, largest share of friction,
@@ -139,15 +151,14 @@ class TorqueScale(Check):
         gains = {k: float(g) for k, g in enumerate(here) if np.isfinite(g) and g > 0}
         values = np.array(list(gains.values()))
         sure = np.array(list(known.values()))
-        rate = _other_rate(fits) if odd else None
+        rate = _other_rate(fits, bool(odd))
         if rate is not None:
-            value = float(f"{rate:.3g}")
+            value = float(f"{rate:.4g}")
             words = f"time={1 / value:.6g},dq={value:g}"
             yield self.suspicion(
                 "the clock runs at a different rate, and the velocities were derived with it",
                 f"with a sampling rate {value:g} times as high, the rigid-body torque explains "
-                f"the measured torque better by {_rate_gain(fits, rate):.0f} (log-likelihood), "
-                "with a plausible scale on every joint",
+                f"the measured torque better by {_rate_gain(fits, rate):.0f} (log-likelihood)",
                 "suspected",
                 remedy=(f"--gain {words}", f"gain={{'time': {1 / value:.6g}, 'dq': {value:g}}}"),
             )
@@ -196,6 +207,10 @@ class TorqueScale(Check):
     ) -> Iterator[Suspicion]:
         """Single joints at another scale than the others."""
         found = {}
+        # If bodies need a torque of this scale, the joint can provide it, and the limit is wrong.
+        usual = {k for k, gain in gains.items() if USUAL[0] <= gain <= USUAL[1]}
+        reached = {k: x for k, x in _beyond_limits(measurement).items() if k not in usual}
+        far = {k for k, times in reached.items() if times > FAR}
         for k, gain in gains.items():
             low, high = CLEARLY if k in known else USUAL
             if low <= gain <= high or (k not in known and gain < low):
@@ -204,7 +219,7 @@ class TorqueScale(Check):
             wrong = not USUAL[0] <= gain <= USUAL[1] and k in known
             if gained > (LEAST if wrong else SURE) and apart > LEAST and not low <= own <= high:
                 found[k] = own
-            elif wrong and gained > 0:
+            elif wrong and gained > 0 and k not in far:
                 yield self.suspicion(
                     f"either the torque of {measurement.joint(k)} has a different scale than that "
                     "of the other joints, or the bodies it moves differ from the description",
@@ -221,17 +236,27 @@ class TorqueScale(Check):
                 f"it is {told} times that of the stated bodies, and {fitted} times that of bodies "
                 "that explain the other joints"
             )
-        # If bodies need a torque of this scale, the joint can provide it, and the limit is wrong.
-        usual = {k for k, gain in gains.items() if USUAL[0] <= gain <= USUAL[1]}
-        far = _beyond_limits(measurement).items()
-        beyond = {k: times for k, times in far if k not in found and k not in usual}
+        if far or any(_unit_like(gain) == KILO for gain in found.values()):
+            far |= set(reached)
+        beyond = {k: times for k, times in reached.items() if k in far and k not in found}
+        for k, times in reached.items():
+            if k not in far and k not in known and k not in found:
+                yield self.suspicion(
+                    f"either the torque of {measurement.joint(k)} is in another unit, or its "
+                    "effort limit in the description is wrong",
+                    f"it reaches {times:.3g} times that limit; the bodies that it moves do not "
+                    "determine its scale",
+                    "noted",
+                    [k],
+                    _gain_remedy({k: 1 / KILO}),
+                )
         if beyond:
             names = ", ".join(measurement.joint(k) for k in beyond)
-            times = ", ".join(f"{size:.3g}" for size in beyond.values())
-            evidence.append(f"it reaches {times} times the effort limit of {names}")
+            sizes = ", ".join(f"{size:.3g}" for size in beyond.values())
+            evidence.append(f"it reaches {sizes} times the effort limit of {names}")
         if found or beyond:
             units = {k: unit for k, gain in found.items() if (unit := _unit_like(gain))}
-            units |= dict.fromkeys(beyond, 1e3)
+            units |= dict.fromkeys(beyond, KILO)
             refined = {k: gain for k, gain in found.items() if k not in units}
             factors = {k: 1 / unit for k, unit in units.items()}
             factors |= refined_scales(fits, units, refined).factors if refined else {}
@@ -254,19 +279,24 @@ def _all_factors(fits: Fits, gains: dict[int, float], typical: float) -> dict[in
     return Scales({k: found.gains[k] for k in known}, {k: found.errors[k] for k in known}).factors
 
 
-def _rate_gain(fits: Fits, rate: float) -> float:
+def _rate_gain(fits: Fits, rate: float, rounds: int = ROUNDS) -> float:
     """Log-likelihood gain of another rate of clock and velocities."""
-    here, there = fits.nominal(Reading()), fits.nominal(Reading(stretch=rate))
+    here, there = (fits.nominal(Reading(stretch=x), rounds) for x in (1.0, rate))
     return float(there.margin(here).sum())
 
 
-def _other_rate(fits: Fits) -> float | None:
-    """Rate of clock and velocities at which all torques have the scale of the bodies.
+def _other_rate(fits: Fits, odd: bool) -> float | None:
+    """Rate of clock and velocities that explains the torque better; None if there is none.
 
-    Inertia grows with its square and gravity does not, so no scale of a torque is equivalent.
+    Inertia grows with its square and gravity does not, so no scale of a torque is equivalent. If
+    the scales of some torques are odd, it must make all of them usual, or identified bodies, which
+    know nothing of scales, must confirm it.
     """
-    best, log = max((_rate_gain(fits, float(np.exp(x))), x) for x in np.log(RATES))
-    step = 0.2
+    few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+    best, log = max((_rate_gain(few, rate, 1), float(np.log(rate))) for rate in RATES)
+    if best < LEAST and not odd:
+        return None
+    step, best = 0.2, _rate_gain(fits, float(np.exp(log)))
     while step > 0.01:
         near, other = max((_rate_gain(fits, float(np.exp(x))), x) for x in (log - step, log + step))
         if near > best:
@@ -274,19 +304,39 @@ def _other_rate(fits: Fits) -> float | None:
         else:
             step /= 2
     rate = float(np.exp(log))
+    if best < SURE or CLEARLY[0] < rate < CLEARLY[1]:
+        return None
     gains = list(_known_gains(fits, Reading(stretch=rate)).values())
-    usual = len(gains) > 1 and all(USUAL[0] <= gain <= USUAL[1] for gain in gains)
-    return rate if best > SURE and usual and not CLEARLY[0] < rate < CLEARLY[1] else None
+    usual = odd and len(gains) > 1 and all(USUAL[0] <= gain <= USUAL[1] for gain in gains)
+    here, there = (fits.identified(Reading(stretch=x)) for x in (1.0, rate))
+    confirmed = float(there.margin(here).sum()) > DECISIVE
+    return _sharpened(fits, rate) if usual or confirmed else None
+
+
+def _sharpened(fits: Fits, rate: float) -> float:
+    """Rate at which identified bodies fit best, since stated ones are not exact.
+
+    Rates that are set wrongly are mostly whole multiples or parts of the right one.
+    """
+
+    def likelihood(log: float) -> float:
+        return float(fits.identified(Reading(stretch=float(np.exp(log)))).likelihood.sum())
+
+    log = peak(likelihood, float(np.log(rate)), RATE_STEP)
+    found = float(np.exp(log)) if abs(log - np.log(rate)) < RATE_MOVES else rate
+    times = max(found, 1 / found)
+    whole = float(round(times)) if abs(times / round(times) - 1) < RATE_WHOLE else times
+    return whole if found > 1 else 1 / whole
 
 
 def _beyond_limits(measurement: Measurement) -> dict[int, float]:
-    """Torques far beyond the effort limit of the description, while others are within."""
+    """Torques beyond the effort limit of the description, while most others are within."""
     robot = measurement.robot
     if robot is None:
         return {}
     limits = np.where(robot.effort_limits > 0, robot.effort_limits, np.inf)
     reached = np.quantile(np.abs(measurement.torque), 0.95, axis=0) / limits
-    far = np.flatnonzero(reached > FAR)
+    far = np.flatnonzero(reached > WITH_ANOTHER)
     if np.mean(reached < 1) < 0.5:
         return {}  # the limits, or all torques, are in another unit
     return {int(k): float(reached[k]) for k in far}
@@ -422,6 +472,9 @@ class UnexplainedTorque(Check):
         bad: NDArray[np.bool_] = (least > UNRELATED) & (least > BEYOND * steady)
         unlike = [k for k, found in zip(seen.joints, bad, strict=True) if found]
         joints = [k for k in unlike if _left_by_position(seen, k) > LEFT]
+        if joints:  # that of another joint may be larger than its own
+            shared = {share.joint for share in find_shares(measurement, seen.fits)}
+            joints = [k for k in joints if k not in shared]
         bad = np.isin(seen.joints, joints)
         if joints:
             names = ", ".join(measurement.joint(k) for k in joints)
@@ -438,15 +491,27 @@ class UnexplainedTorque(Check):
 def _left_by_position(seen: Explained, k: int) -> float:
     """Share of the residual of identified bodies that no function of the position explains.
 
-    A spring of any form, or a stop, is related to the motion.
+    A spring of any form, or a stop, is related to the motion, and is the same in all recordings, by
+    the others of which each is predicted: slow noise would be followed otherwise.
     """
-    residual = seen.identified.residual[k]
-    q = seen.fits.average(seen.fits.signals.q[:, k])[seen.fits.moving[:, k]]
+    residual, use = seen.identified.residual[k], seen.fits.moving[:, k]
+    q = seen.fits.average(seen.fits.signals.q[:, k])[use]
+    part = seen.fits.signals.trajectory[::SAMPLES][use]
+    if len(np.unique(part)) < FEWEST_PARTS:
+        part = np.arange(len(q)) * FEWEST_PARTS // len(q)
     nodes = np.unique(np.quantile(q, np.linspace(0, 1, PLACES)))
-    # broken lines between few nodes; as many as for a constant each could follow slow noise
     hats = np.stack([np.interp(q, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
-    rest = residual - hats @ np.linalg.lstsq(hats, residual, rcond=None)[0]
-    return float(np.std(rest) / (np.std(residual) + 1e-300))
+    rest, known = residual.copy(), np.zeros(len(q), dtype=bool)
+    for one in np.unique(part):
+        out = part == one
+        seen_nodes = hats[~out].sum(axis=0) > FEWEST_PARTS
+        known[out] = hats[out][:, seen_nodes].sum(axis=1) > 0.99
+        fitted = np.linalg.lstsq(hats[~out][:, seen_nodes], residual[~out], rcond=1e-6)[0]
+        rest[out] -= hats[out][:, seen_nodes] @ fitted
+    if known.mean() < MOSTLY:  # recordings in different places predict nothing
+        rest = residual - hats @ np.linalg.lstsq(hats, residual, rcond=None)[0]
+        known[:] = True
+    return float(np.std(rest[known]) / (np.std(residual[known]) + 1e-300))
 
 
 class NoFriction(Check):

@@ -36,6 +36,8 @@ CLOSER = 1.1
 MISSING, ROUNDED = 0.05, 1.5
 #: Share of rows that repeat the previous one, or lie on a line between their neighbours.
 REPEATED, ON_A_LINE = 0.02, 0.3
+#: How near the share of the other rows is to one in a whole number to be that.
+NEARLY = 0.1
 #: Share of rows with the stamp of the previous row from which the stamps are too coarse.
 SAME = 0.05
 #: Share of repeated rows from which accelerations, and with them findings, are wrong.
@@ -371,7 +373,10 @@ class InterpolatedRows(Check):
         moving, on_line = _on_a_line(s, s.q)
         if moving > 50 and on_line > ON_A_LINE * moving:
             measurement.stale = True
-            rate = float(f"{measurement.rate * (1 - on_line / moving):.3g}")
+            share = 1 - on_line / moving  # one of so many rows, but for those at ends and rests
+            every = round(1 / max(share, 1e-3))
+            whole = abs(share * every - 1) < NEARLY
+            rate = float(f"{measurement.rate / every if whole else measurement.rate * share:.4g}")
             yield self.suspicion(
                 "rows were interpolated from a slower clock",
                 f"in {100 * on_line / moving:.0f} % of the moving rows all joints lie on straight "

@@ -32,6 +32,8 @@ NEARLY = 0.008
 FAR = 1e-3
 #: Least velocity of rows that count, in rad/s (a tenth of it in m/s).
 SLIDING = 0.05
+#: Nodes of a function of the position; numbers of recordings that may carry loads of their own.
+PLACES, FEW_RUNS, MOST_RUNS = 8, 1, 8
 #: Largest share of the torque's spread that the fit of a joint may leave for its lag to count.
 LEFT = 0.5
 
@@ -54,6 +56,8 @@ class RunDelay:
         The same at the lag of the other recordings.
     usual : float, s
         Lag of the other recordings.
+    joints : int
+        Number of joints whose own lag is close to it.
     """
 
     lag: float
@@ -63,6 +67,7 @@ class RunDelay:
     left: float = 1.0
     before: float = 1.0
     usual: float = 0.0
+    joints: int = 0
 
 
 @dataclass(frozen=True)
@@ -117,10 +122,15 @@ def find_delay(fits: Fits) -> Delay:
     fits : Fits
         Rows.
     """
-    near, beyond = _delay_within(fits, LAGS)
-    if not beyond:
+    near, beyond, late_runs = _delay_within(fits, LAGS)
+    if not beyond and not late_runs:
         return near
-    far, _ = _delay_within(fits, FAR_LAGS)
+    far, *_ = _delay_within(fits, FAR_LAGS)
+    # a single joint, with few rows, may have any lag
+    later = {run: one for run, one in far.runs.items() if late_runs and one.joints > 1}
+    runs = {**later, **near.runs}
+    if not beyond:  # only single recordings are
+        return replace(near, runs=runs)
     if beyond > MOST_BEYOND * fits.n_joints:
         return replace(far, runs={})  # these lags are too far apart for single recordings
     only_far = ~np.isfinite(near.joints) & np.isfinite(far.joints)
@@ -131,11 +141,12 @@ def find_delay(fits: Fits) -> Delay:
         gains=np.where(only_far, far.gains, near.gains),
         halves=np.where(only_far[:, None], far.halves, near.halves),
         drifts=np.where(only_far, far.drifts, near.drifts),
+        runs=runs,
     )
 
 
-def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:
-    """The best of some lags, and the number of joints whose best lag is the first or the last."""
+def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
+    """The best of some lags, and how many joints and recordings have the first or the last."""
     n = fits.n_joints
     beyond, middle = 0, len(lags_tried) // 2
     own_errors, own_gains, halves = np.full(n, np.nan), np.zeros(n), np.full((n, 2), np.nan)
@@ -156,12 +167,10 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:
         use = _sliding(fits, s, j)
         if not fits.usable(j) or use.sum() < FEWEST:
             continue
-        own = _own_columns(s, j)
-        columns = np.column_stack([regressor[use, j], fits.average(own)[use]])
-        columns = columns[:, np.abs(columns).max(axis=0) > 0]
-        columns = columns / np.linalg.norm(columns, axis=0)
-        basis, values, _ = np.linalg.svd(columns, full_matrices=False)
-        basis = basis[:, values > 1e-6 * values[0]]
+        own = np.column_stack([_own_columns(s, j), _of_position(s, j)])
+        felt = regressor[use, j]
+        columns = np.column_stack([felt, fits.average(own)[use]])
+        basis = _basis(np.column_stack([columns, _by_recording(felt, run_of[use])]))
         if basis.shape[1] > 0.5 * len(basis):
             continue
         y = np.stack([torque[use, j] for torque in shifted], axis=1)
@@ -175,7 +184,8 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:
             beyond += 1
             continue
         tables.append((len(rest), errors))
-        for run, cost in _run_costs(basis, y, int(np.argmin(total)), run_of[use]):
+        # a load of a recording would follow part of its own lag
+        for run, cost in _run_costs(_basis(columns), y, run_of[use]):
             squares.setdefault(run, []).append(cost)
             counts[run] = counts.get(run, 0) + int(np.sum(run_of[use] == run))
         sooner = rest * first[use][:, None]
@@ -189,7 +199,7 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:
         halves[j] = [_lowest((rest[rows] ** 2).sum(axis=0), lags_tried) for rows in (~fast, fast)]
         own_gains[j] = len(rest) / 2 * np.log(total[middle] / _least(total))
     if not tables:
-        return unknown, beyond
+        return unknown, beyond, 0
 
     # squared errors, and not their logarithms, are a parabola of the lag
     noise = [float(e.sum(axis=0).min()) / n for n, e in tables]
@@ -207,17 +217,17 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int]:
     whole = sum(n / 2 * np.log(e.sum(axis=0)) for n, e in tables)
     gain = float(whole[middle] - _least(whole))
     early, late = lag(firsts), lag(seconds)
-    runs = _of_runs(squares, counts, lags_tried)
+    runs, runs_beyond = _of_runs(squares, counts, lags_tried)
     found = Delay(
         common, error, lags, own_errors, gain, own_gains, halves, early, late, drift, runs, drifts
     )
-    return found, beyond
+    return found, beyond, runs_beyond
 
 
-def _run_costs(
-    basis: Array, torque: Array, usual: int, run_of: Array
-) -> Iterator[tuple[int, Array]]:
+def _run_costs(basis: Array, torque: Array, run_of: Array) -> Iterator[tuple[int, Array]]:
     """Half the squared residual of every recording over noise, by lag, with the bodies of others.
+
+    These are fitted at the lag at which they explain the other recordings best.
 
     Parameters
     ----------
@@ -225,21 +235,22 @@ def _run_costs(
         Orthonormal columns.
     torque : ndarray of shape (n_rows, n_lags)
         Torque at every lag.
-    usual : int
-        Lag at which the other recordings are fitted.
     run_of : ndarray of shape (n_rows,)
         Recording of every row.
     """
-    y = torque[:, usual]
-    whole = basis.T @ y
+    whole = basis.T @ torque
     for run in np.unique(run_of).tolist():
         rows = run_of == run
         own = basis[rows]
+        if rows.sum() < FEWEST_OF_RUN or rows.all():
+            continue
         gram = np.eye(basis.shape[1]) - own.T @ own
         gram[np.diag_indices(len(gram))] += 1e-3  # excited only by this recording
-        bodies = np.linalg.solve(gram, whole - own.T @ y[rows])
-        noise = float(np.mean((y[~rows] - basis[~rows] @ bodies) ** 2)) if (~rows).any() else 0.0
-        if rows.sum() < FEWEST_OF_RUN or noise <= 0:
+        found = np.linalg.solve(gram, whole - own.T @ torque[rows])
+        others = np.mean((torque[~rows] - basis[~rows] @ found) ** 2, axis=0)
+        usual = int(np.argmin(others))
+        bodies, noise = found[:, usual], float(others[usual])
+        if noise <= 0:
             continue
         left = torque[rows] - (own @ bodies)[:, None]
         # unknown parameters of the others' bodies have no penalty
@@ -249,12 +260,15 @@ def _run_costs(
 
 def _of_runs(
     squares: Mapping[int, list[Array]], counts: Mapping[int, int], tried: Array
-) -> dict[int, RunDelay]:
-    """Lags of single recordings, from half the squared residuals of their joints over noise."""
+) -> tuple[dict[int, RunDelay], int]:
+    """Lags of single recordings, from half the squared residuals of their joints over noise.
+
+    Also returns the number of recordings whose best lag is the first or the last.
+    """
     if len(squares) < 3:
-        return {}
+        return {}, 0
     whole = {run: np.sum(parts, axis=0) for run, parts in squares.items()}
-    found = {}
+    found, beyond = {}, 0
     for run, parts in squares.items():
         usual = _lowest(
             np.sum([cost for other, cost in whole.items() if other != run], axis=0), tried
@@ -262,6 +276,7 @@ def _of_runs(
         lag = _lowest(whole[run], tried)
         here, there = (int(np.argmin(np.abs(tried - x))) for x in (usual, lag))
         if there in (0, len(tried) - 1):
+            beyond += 1
             continue
         gains = np.array([part[here] - part[there] for part in parts])
         own = np.array([_lowest(part, tried) for part in parts])
@@ -272,9 +287,10 @@ def _of_runs(
         agreeing = float(weight[near].sum()) / total
         left, before = (np.sqrt(2 * float(whole[run][x]) / counts[run]) for x in (there, here))
         found[run] = RunDelay(
-            lag - usual, error, float(gains.sum()), agreeing, float(left), float(before), usual
+            *(lag - usual, error, float(gains.sum()), agreeing, float(left), float(before), usual),
+            int(np.sum(near & (gains > 0))),
         )
-    return found
+    return found, beyond
 
 
 class JointFit:
@@ -403,6 +419,29 @@ def _own_columns(signals: Signals, joint: int) -> Array:
     """Columns of a joint in addition to those of the bodies."""
     ones = np.ones(signals.n_samples)
     return np.column_stack([friction(signals, joint), _bent_friction(signals, joint), ones])
+
+
+def _basis(columns: Array) -> Array:
+    """Orthonormal columns that span the same."""
+    columns = columns[:, np.abs(columns).max(axis=0) > 0]
+    basis, values, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+    return np.asarray(basis[:, values > 1e-6 * values[0]])
+
+
+def _by_recording(regressor: Array, run_of: Array) -> Array:
+    """Columns of a load on the last body that differs from recording to recording."""
+    load = regressor[:, -10:-6]  # its mass and first moments
+    runs = np.unique(run_of)
+    if not FEW_RUNS < len(runs) <= MOST_RUNS:
+        return np.zeros((len(load), 0))
+    return np.hstack([load * (run_of == run)[:, None] for run in runs[1:]])
+
+
+def _of_position(signals: Signals, joint: int) -> Array:
+    """Any slow function of the position, as of a spring that is missing."""
+    q = signals.q[:, joint]
+    nodes = np.unique(np.quantile(q, np.linspace(0, 1, PLACES)))
+    return np.stack([np.interp(q, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
 
 
 def _bent_friction(signals: Signals, joint: int) -> Array:

@@ -8,8 +8,11 @@ multiples, or with one of two zeros, and which one a recording has is fitted as 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +21,9 @@ from skidyn._signals import Array
 from skidyn.measurement._bodies import explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
-from skidyn.measurement._fits import SAMPLES, Fits, Reading
+from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._robust import fit_at_once, fit_together
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes
 
@@ -32,15 +36,16 @@ WORTH = 0.08
 #: How nearly the multiples of either group must be the same, as a share, and what they may differ
 #: by without a mistake: a payload or friction that changes.
 ALIKE, USUAL = 0.25, (0.4, 2.5)
-#: Rounds of the fit of multiples.
-ROUNDS = 12
+#: Rounds of the fit of multiples, its ridge, and nodes of a function of the position.
+ROUNDS, RIDGE, PLACES = 12, 1e-6, 8
 #: Log-likelihood that two groups must gain with identified bodies, the share of the residual that
 #: they must take off, and what they may leave of what the best effect leaves.
 SURE, DROP, BETTER = 40.0, 0.4, 0.8
 #: Zeros that are tried, and the least that is reported, rad.
 ZEROS, LEAST_ZERO = np.deg2rad([-60, -40, -20, 20, 40, 60]), np.deg2rad(4)
-#: Zeros that are examined in detail.
-FINALISTS = 4
+#: Zeros that are examined in detail, rows for the choice of them, and most groups of recordings
+#: that are all tried.
+FINALISTS, ROWS, MOST_GROUPS = 4, 400, 100
 
 
 @dataclass(frozen=True)
@@ -131,18 +136,62 @@ def _divided_torques(fits: Fits, joints: list[int]) -> Iterator[Division]:
             continue
         others, value = split
         out = runs[[told[i] for i in np.flatnonzero(others)]]
+        odd = np.isin(number, out)
+        flexible = _flexible(fits, k)
+        value = _refined(flexible, y[use], odd[use], value)
+        if USUAL[0] < value < USUAL[1] or value == 0:
+            continue
         torque = fits.torque.copy()
         torque[np.isin(fits.signals.trajectory, out), k] /= value
-        mended = fits.with_torque(torque).identified(Reading())
-        margin = mended.margin(here)
-        changed = float(np.isin(number[use], out).sum())
-        margin[k] -= changed * np.log(abs(value)) / max(mended.inflation_of(k), 1.0)
-        after = _spread(mended.residual[k]) / _spread(fits.average(torque[:, k])[use])
-        drop = 1 - after / (_spread(here.residual[k]) / _spread(y[use]))
+        mended = fits.with_torque(torque)
+        there = mended.identified(Reading())
+        margin = there.margin(here)
+        changed = float(odd[use].sum()) * np.log(abs(value))
+        margin[k] -= changed / max(there.inflation_of(k), 1.0)
+        after = mended.mean_torque(k)[0]
+        drop = 1 - _left(there.residual[k], after[use]) / _left(here.residual[k], y[use])
         gain = float(margin.sum())
-        if gain > SURE and drop > DROP and _unlike_effects(fits, k, np.isin(number, out), drop):
+        if gain <= SURE or drop <= DROP:
+            # what bodies do not explain, such as a spring, is a function of the position
+            gain, drop = _flexible_gain(flexible, y[use], after[use], changed)
+        if gain > SURE and drop > DROP and _unlike_effects(fits, mended, k, odd, abs(value)):
             kind = "sign" if USUAL[0] < -value < USUAL[1] else "scale"
             yield Division(kind, k, tuple(map(int, out)), value, gain, drop)
+
+
+def _flexible(fits: Fits, k: int) -> Array:
+    """Columns of the torque of a joint: bodies of its own, and any function of its position."""
+    _, use = fits.mean_torque(k)
+    q = fits.average(fits.signals.q[:, k])[use]
+    nodes = np.unique(np.quantile(q, np.linspace(0, 1, PLACES)))
+    hats = np.stack([np.interp(q, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
+    return np.hstack([fits.felt(k)[0][use], hats])
+
+
+def _refined(columns: Array, y: Array, odd: NDArray[np.bool_], value: float) -> float:
+    """Multiple of the torque of some rows of which the others have one."""
+    size = np.linalg.norm(columns, axis=0) + 1e-12
+    for _ in range(ROUNDS):
+        x = columns / size * np.where(odd, value, 1.0)[:, None]
+        gram = x.T @ x + RIDGE * np.trace(x.T @ x) / x.shape[1] * np.eye(x.shape[1])
+        predicted = columns / size @ np.linalg.solve(gram, x.T @ y)
+        square = float(predicted[odd] @ predicted[odd])
+        value = float(y[odd] @ predicted[odd]) / square if square > 0 else 0.0
+    return value
+
+
+def _flexible_gain(columns: Array, y: Array, after: Array, changed: float) -> tuple[float, float]:
+    """Log-likelihood gain of a changed torque with such columns, and what it takes off."""
+    place = [np.arange(columns.shape[1])]
+    here, there = (fit_together([columns], place, [torque])[0] for torque in (y, after))
+    gain = there.likelihood - here.likelihood - changed
+    drop = 1 - _left(there.residual, after) / _left(here.residual, y)
+    return gain / max((there if gain > 0 else here).inflation, 1.0), drop
+
+
+def _left(residual: Array, y: Array) -> float:
+    """Spread of a residual as a share of that of the torque."""
+    return _spread(residual) / _spread(y)
 
 
 def _multiples(designs: list[Array], targets: list[Array]) -> Array:
@@ -211,14 +260,12 @@ def _divided_zeros(fits: Fits) -> Iterator[Division]:
     if len(runs) < RECORDINGS or not turning:
         return
     here = fits.identified(Reading())
-    plain = _by_run(fits, fits.signals.q, number, runs)
+    few = fits.thinned(ROWS)
     tried = []
     for k in turning:
         for angle in ZEROS.tolist():
-            q = fits.signals.q.copy()
-            q[:, k] -= angle
-            better, apart = _set_apart(_by_run(fits, q, number, runs) - plain)
-            tried.append((apart, k, angle, runs[better]))
+            gain, group = _best_group(len(runs), partial(_likelihoods, few, here, k, angle))
+            tried.append((gain, k, angle, runs[group]))
     tried.sort(key=lambda one: -one[0])
 
     def mended(k: int, angle: float, out: NDArray[np.int64]) -> Fits:
@@ -245,45 +292,76 @@ def _divided_zeros(fits: Fits) -> Iterator[Division]:
         return
     if 2 * len(out) > len(runs):
         out, angle = np.setdiff1d(runs, out), -angle
-    there = mended(k, angle, out).identified(Reading())
+    fixed = mended(k, angle, out)
+    there = fixed.identified(Reading())
     worst = int(np.argmax(there.margin(here)))
     drop = 1 - float(_spread(there.residual[worst]) / _spread(here.residual[worst]))
-    if drop > DROP and _unlike_effects(fits, worst, np.isin(number, out), drop):
+    if drop > DROP and _unlike_effects(fits, fixed, worst, np.isin(number, out)):
         yield Division("zero", k, tuple(map(int, out)), angle, value, drop)
 
 
-def _unlike_effects(fits: Fits, joint: int, rows: NDArray[np.bool_], drop: float) -> bool:
-    """Whether an effect in these recordings, such as a payload, leaves clearly more than a mistake.
+def _unlike_effects(
+    fits: Fits, mended: Fits, joint: int, rows: NDArray[np.bool_], value: float = 1.0
+) -> bool:
+    """Whether an effect, such as a payload in these recordings, leaves clearly more than a mistake.
 
-    A payload multiplies the weight that a wrist carries.
+    A payload multiplies the weight that a wrist carries. The same effects may be beside a mistake.
     """
-    return 1 - drop < BETTER * left_by_effects(fits, joint, rows)[2]
+    with_it, without = (left_by_effects(f, joint, rows)[2] for f in (mended, fits))
+    return with_it < BETTER * without / value
 
 
-def _set_apart(change: Array) -> tuple[NDArray[np.bool_], float]:
-    """Recordings that gain more than the others, by the largest gap, and how far they are apart."""
-    order, n = np.sort(change), len(change)
-    least = int(np.ceil(SHARE * n))
-    gaps = np.diff(order)[least - 1 : n - least]
-    cut = least - 1 + int(np.argmax(gaps))
-    middle = (order[cut] + order[cut + 1]) / 2
-    return change > middle, float(np.abs(change - middle).sum())
+def _best_group(n: int, likelihoods: Callable[[list[list[int]]], Array]) -> tuple[float, list[int]]:
+    """The likeliest group of a third to half of n recordings, by their numbers from 0.
+
+    Of many recordings not all groups are tried, but from a group those with one more or one fewer.
+    """
+    sizes = range(int(np.ceil(SHARE * n)), n // 2 + 1)
+    if sum(comb(n, size) for size in sizes) <= MOST_GROUPS:
+        groups = [list(group) for size in sizes for group in combinations(range(n), size)]
+        values = likelihoods(groups)
+        return float(values.max()), groups[int(np.argmax(values))]
+    group: list[int] = []
+    value = -np.inf
+    while True:
+        least = min(sizes.start, len(group) + 1)
+        groups = [sorted({k} ^ set(group)) for k in range(n)]
+        groups = [g for g in groups if least <= len(g) < sizes.stop]
+        values = likelihoods(groups)
+        if len(group) >= sizes.start and values.max() <= value:
+            return value, group
+        value, group = float(values.max()), groups[int(np.argmax(values))]
 
 
-def _by_run(fits: Fits, q: Array, number: NDArray[np.int64], runs: NDArray[np.int64]) -> Array:
-    """Log-likelihood of every recording with stated bodies, with friction common to all of them."""
-    moved = _with_positions(fits, q)
-    outcome = moved.nominal(Reading(), 2)
-    total = np.zeros(len(runs))
-    for k in range(fits.n_joints):
-        if not fits.usable(k):
-            continue
-        own = number[fits.moving[:, k]]
-        scale = float(outcome.scale[k])
-        for i, run in enumerate(runs):
-            rest = outcome.residual[k][own == run] / scale
-            total[i] -= 2.5 * float(np.log1p(rest**2 / 4).sum()) / outcome.inflation_of(k)
-            total[i] -= len(rest) * np.log(scale) / outcome.inflation_of(k)
+def _likelihoods(
+    fits: Fits, known: Outcome, joint: int, angle: float, groups: list[list[int]]
+) -> Array:
+    """Log-likelihood of another zero in every group of recordings, with stated bodies.
+
+    Friction and the scale of every torque are common to all recordings, and fitted anew for every
+    group: where many recordings differ, those of all of them are right for none.
+    """
+    number, runs = _runs_of(fits)
+    plain, turned = (fits.columns(Reading(zero=zero)) for zero in ((), ((joint, angle),)))
+    felt = [
+        k
+        for k in range(fits.n_joints)
+        if fits.usable(k) and np.any(plain[..., k] != turned[..., k])
+    ]
+    total = np.zeros(len(groups))
+    for k in felt:
+        y, use = fits.mean_torque(k)
+        before = fit_at_once(plain[None, :, :, k], y[None], use[None])[0].likelihood
+        columns = np.stack(
+            [
+                np.where(np.isin(number, runs[g])[:, None], turned[..., k], plain[..., k])
+                for g in groups
+            ]
+        )
+        shape = len(groups), len(y)
+        fitted = fit_at_once(columns, np.broadcast_to(y, shape), np.broadcast_to(use, shape))
+        after = [fit.likelihood for fit in fitted]
+        total += (np.array(after) - before) / known.inflation_of(k)
     return total
 
 

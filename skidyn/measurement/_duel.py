@@ -119,8 +119,8 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[fl
     -------
     without, least : float
         Root mean squares of the residual over its scale in all rows.
-    share : float
-        The least root mean square that an effect leaves, as a share of that without effects.
+    torque : float, N m or N
+        Least root mean square residual with an effect.
     """
     reading = Reading()
     gains = np.nan_to_num(fits.nominal(reading).gain)
@@ -131,7 +131,7 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[fl
     fits_of = [here.plain, *(here.fit(columns) for _, columns, _ in effects)]
     left = [float(np.sqrt(np.mean(fit.residuals[k][own] ** 2))) for fit in fits_of]
     scaled = [x / fit.scales[k] for x, fit in zip(left, fits_of, strict=True)]
-    return scaled[0], min(scaled), min(left) / left[0]
+    return scaled[0], min(scaled), min(left)
 
 
 def _effects() -> Iterator[Effect]:

@@ -16,13 +16,15 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
 from skidyn.measurement._fits import SAMPLES, Fits, Reading
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._odd_order import find_exchanges
 from skidyn.measurement._robust import robust_likelihood, student
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes
 
 #: Fewest rows of a recording to be judged.
 FEWEST = 12
-#: Log-likelihood that another multiple must gain in a recording, and another zero, which is free.
+#: Log-likelihood that another multiple must gain in a recording, beside the logarithm of their
+#: number, and another zero, which is free.
 LEAST, SURE = 15.0, 40.0
 #: Least spread of what the other recordings predict, in residuals, for its multiple to be reported.
 CLEAR = 2.0
@@ -90,7 +92,21 @@ class OddRecording(Check):
         if sizes:
             measurement.odd = True
             return
+        exchanged = list(find_exchanges(seen))
+        for pair in exchanged:
+            measurement.odd = True
+            names = " and ".join(measurement.joint(k) for k in pair.joints)
+            yield self.suspicion(
+                f"in trajectory {pair.run} the torques of {names} are exchanged",
+                "each is what the other trajectories predict for the other joint, which improves "
+                f"the fit by {pair.gain:.0f} (log-likelihood); fix that file, or leave it out",
+                "suspected",
+                pair.joints,
+            )
+        if exchanged:
+            return
         told = _multiples(seen)
+        least = LEAST + np.log(max(1, len(told)))  # of so many torques one may gain by chance
         scaled, unlike = [], []
         for k in sorted({one.joint for one in told}):
             own = [one for one in told if one.joint == k]
@@ -102,9 +118,9 @@ class OddRecording(Check):
                 if _clipped(measurement, one):
                     continue  # its torque has another multiple because it is saturated
                 within = USUAL[0] <= one.multiple <= USUAL[1]
-                if not within and one.gain > LEAST and abs(one.likeness) > SCALED:
+                if not within and one.gain > least and abs(one.likeness) > SCALED:
                     scaled.append(one)
-                elif one.gain > LEAST and one.larger > LARGER and one.likeness < UNLIKE:
+                elif one.gain > least and one.larger > LARGER and one.likeness < UNLIKE:
                     # a contact, or a payload of one recording, would look like it
                     without, left, _ = left_by_effects(seen.fits, k, _rows_of(seen.fits, one.run))
                     if left > max(LARGER, LEFT * without):
@@ -252,11 +268,15 @@ def _multiples(seen: Explained) -> list[Multiple]:
             predicted = (y - outcome.residual[k])[own]
             if k in others:
                 predicted, scale = others[k]
+            spoils = scale < outcome.scale[k] / 2
+            if seen.stated.scale[k] < scale / 2:
+                # the torque of a joint in another unit spoils bodies common to all of them
+                predicted, scale = (y - seen.stated.residual[k])[own], float(seen.stated.scale[k])
+                spoils = False
             found = _multiple(y[own], predicted, scale) if own.sum() >= FEWEST else None
             if found is not None:
                 size, likeness, gain, larger = found
                 gain /= max(1.0, outcome.inflation_of(k))
-                spoils = scale < outcome.scale[k] / 2
                 told.append(Multiple(k, int(run), size, likeness, gain, larger, bool(spoils)))
     return told
 

@@ -23,6 +23,9 @@ LEAST = 15.0
 WEAKEST, DECISIVE, HALF = 3.0, 60.0, 0.5
 #: What it gains with stated bodies where identified ones, that could be negative, need not agree.
 OVERWHELMING = 100.0
+#: Share of a joint's residual that a zero must take off to be noted beside other bodies, and its
+#: least angle, rad: the direction of a weight in a description is not known better.
+MOSTLY, NOTED = 0.8, np.deg2rad(10)
 #: Changes of one joint whose gains differ by less than this, or this share, cannot be separated.
 TIED, ALIKE = 3.0, 0.05
 #: Share of the gain within which another kind of change of the same joints is equally possible.
@@ -85,6 +88,8 @@ class Change:
         Other kinds of change of the same joints that explain equally much.
     other : str
         An equally good explanation other than a reading, such as a physical effect; empty if none.
+    rival_gains : bool
+        Whether that other explanation is the likelier one.
     restorable : bool
         For torque without gravity: whether it was subtracted with the bodies of the description.
     """
@@ -98,6 +103,7 @@ class Change:
     drop: float = 0.0
     rivals: tuple[str, ...] = ()
     other: str = ""
+    rival_gains: bool = False
     restorable: bool = False
 
 
@@ -127,6 +133,8 @@ def find_changes(fits: Fits) -> list[Change]:
             fitted += best.joints
             best = replace(best, reading=_sharpened(fits, best.reading, fitted))
         found += [replace(best, kind=kind) for kind in both]
+        if best.rival_gains:
+            break  # nothing is read on top of what may be a load
         reading = best.reading
     return found
 
@@ -195,11 +203,18 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             rivals = tuple(dict.fromkeys(c.kind for c in alike))
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
     while accepted:
-        best = _first(accepted)
+        best = _turned(fits, _first(accepted), accepted)
         held = _against_effects(fits, reading, here, best)
         if held is not None:
             return held
         accepted.remove(best)
+    if reading != Reading():
+        return None  # what is read anew already, and bodies, need no other zero
+    turned = [c for c in judged if c.kind == "zero" and c.gain >= max(OVERWHELMING, most)]
+    for change in turned:
+        angle = abs(change.reading.zero[-1][1])
+        if change.drop >= MOSTLY and angle >= NOTED:
+            return _or_bodies(fits, reading, change)
     return None
 
 
@@ -246,6 +261,20 @@ def _first(accepted: list[Change]) -> Change:
     return next(c for c in (first, *tied) if _free_angles(c) == angles)
 
 
+def _turned(fits: Fits, first: Change, accepted: list[Change]) -> Change:
+    """The change that comes first, or a zero in place of gravity along an axis.
+
+    Both are alike to the stated bodies, but identified ones determine the angle of the joint.
+    """
+    for zero in accepted:
+        if _but_for_angle(first, zero):
+            sharp = _sharpened(fits, zero.reading, zero.joints)
+            there, here = (fits.identified(reading) for reading in (sharp, first.reading))
+            if float(there.margin(here).sum()) >= DECISIVE:
+                return replace(zero, reading=sharp)
+    return first
+
+
 def _free_angles(change: Change) -> int:
     """Number of angles of a change that were fitted."""
     if change.kind == "gravity":
@@ -279,6 +308,16 @@ def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change
     if duel.gain < LEAST or max(duel.beside, duel.gain - duel.rival) <= 0:
         return None
     return replace(change, other=duel.effect)
+
+
+def _or_bodies(fits: Fits, reading: Reading, zero: Change) -> Change | None:
+    """A zero that explains nearly all, beside other bodies or a load, which do so as well.
+
+    They turn the direction of the weight on a last joint as another zero does.
+    """
+    duel = fight(fits, reading, zero.reading, zero.joints)
+    other = duel.effect or OTHER_BODIES
+    return replace(zero, other=other, rival_gains=True) if duel.gain > 0 else None
 
 
 def _refined(fits: Fits, change: Change) -> Change:

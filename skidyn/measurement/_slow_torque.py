@@ -21,8 +21,8 @@ from skidyn.measurement._suspicion import Suspicion
 #: Rows between two values of the slower bus that are tried, and orders of the differences: of held
 #: values, lines and cubic splines.
 PERIODS, ORDERS = range(2, 17), (1, 2, 4)
-#: Least log-likelihood gain of a period on a joint; share of the joints that must agree; how many
-#: times as large the largest differences are as the smallest ones.
+#: Least log-likelihood gain of a period on all joints; share of the joints that must gain by it;
+#: how many times as large the largest differences are as the smallest ones, on one of them.
 SURE, AGREEING, TIMES = 40.0, 0.6, 1.7
 #: Fewest differences of each phase, and least size of them as a share of the spread of the torque.
 FEWEST, ROUNDING = 30, 1e-9
@@ -40,15 +40,13 @@ class SlowTorque(Check):
         if measurement.stale or measurement.smoothed or measurement.lost:
             return  # reported by another check, or rows have no number
         for order in ORDERS:
-            found = {
-                k: (period, gain, times)
-                for k, (period, gain, times) in _periods(measurement, order).items()
-                if gain > SURE and times > TIMES
-            }
-            periods = [period for period, _, _ in found.values()]
-            common = max(set(periods), key=periods.count) if periods else 0
-            alike = {k: one for k, one in found.items() if one[0] == common}
-            if not alike or len(alike) < AGREEING * sum(measurement.excited):
+            found = _common_period(measurement, order)
+            if found is None:
+                continue
+            common, alike = found
+            told = sum(gain for gain, _ in alike.values())
+            largest = max(times for _, times in alike.values())
+            if told < SURE or largest < TIMES or len(alike) < AGREEING * sum(measurement.excited):
                 continue
             measurement.stale = True
             rate = float(f"{measurement.rate / common:.4g}")
@@ -56,9 +54,8 @@ class SlowTorque(Check):
             yield self.suspicion(
                 f"the torque was {way} between the values of a slower bus, at about {rate:g} Hz",
                 f"every {common} rows it {'changes' if order == 1 else 'bends'} up to "
-                f"{max(times for _, _, times in alike.values()):.3g} times as much as in the rows "
-                f"between, equally on {len(alike)} joints, which improves the likelihood of these "
-                f"changes by {sum(gain for _, gain, _ in alike.values()):.0f}",
+                f"{largest:.3g} times as much as in the rows between, equally on {len(alike)} "
+                f"joints, which improves the likelihood of these changes by {told:.0f}",
                 "suspected",
                 alike,
                 (f"--resample {rate:g}", f"resample_rate={rate:g}"),
@@ -66,10 +63,15 @@ class SlowTorque(Check):
             return
 
 
-def _periods(measurement: Measurement, order: int) -> dict[int, tuple[int, float, float]]:
-    """Period of every torque's differences, its log-likelihood gain, and their largest ratio.
+def _common_period(
+    measurement: Measurement, order: int
+) -> tuple[int, dict[int, tuple[float, float]]] | None:
+    """Period that the differences of all torques gain most by, together.
 
-    Joints, from 0, that do not move and torques that never change are left out.
+    The values of one bus come at the same time, so that joints with much noise need not show by
+    themselves what others show. Returned with the log-likelihood gain and the largest ratio of
+    sizes on every joint, from 0, that gains; joints that do not move and torques that never change
+    are left out.
     """
     s, spread = measurement.signals, np.std(measurement.torque, axis=0)
     joints = np.flatnonzero(measurement.excited & (spread > 0))
@@ -81,9 +83,9 @@ def _periods(measurement: Measurement, order: int) -> dict[int, tuple[int, float
     ]
     parts = [part - part.mean(axis=0) for part in parts]  # for squares without cancellation
     squares = [np.sum(part**2, axis=0) for part in parts]
-    best = dict.fromkeys(joints.tolist(), (0, 0.0, 1.0))
-    if not best or max(map(len, parts), default=0) < 4 * FEWEST:
-        return best
+    if not len(joints) or max(map(len, parts), default=0) < 4 * FEWEST:
+        return None
+    most, found = 0.0, None
     for period in PERIODS:
         sizes = [
             _sizes(part, square, period)
@@ -96,10 +98,11 @@ def _periods(measurement: Measurement, order: int) -> dict[int, tuple[int, float
         gains = sum(gain for _, _, gain in sizes) - 0.5 * np.log(counts.sum()) * (period - 1)
         logs = np.average([logs for logs, _, _ in sizes], axis=0, weights=counts)
         times = np.exp(np.ptp(logs, axis=0))
-        for k, gain, ratio in zip(best, gains.tolist(), times.tolist(), strict=True):
-            if gain > max(best[k][1] * 1.1, best[k][1] + 5.0):  # multiples of it gain as much
-                best[k] = (period, gain, ratio)
-    return best
+        total = float(np.maximum(gains, 0.0).sum())
+        if total > max(1.1 * most, most + 5.0):  # multiples of it gain as much
+            alike = zip(joints.tolist(), gains.tolist(), times.tolist(), strict=True)
+            most, found = total, (period, {k: (g, x) for k, g, x in alike if g > 0})
+    return found
 
 
 def _sizes(logs: Array, square: Array, period: int) -> tuple[Array, int, Array]:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
@@ -47,8 +48,11 @@ AGREEING = 0.75
 #: How far the lag of one joint must be from those of others, s, and how nearly it must be the same
 #: in its slower and its faster rows, as a share of it.
 APART, SAME = 0.008, 0.3
-#: Fewest other joints of known lag to compare with it, in robots that have as many.
-FEWEST_SURE = 2
+#: Fewest other joints of known lag to compare with it, in robots that have as many, and the largest
+#: lag of these, as a share of it, if it is more than the smallest that is reported.
+FEWEST_SURE, LITTLE = 2, 0.2
+#: Log-likelihood that the lag of a single joint must gain; an unknown effect may look like one.
+ALONE = 60.0
 
 
 #: Share of the recordings that may be late by themselves, and log-likelihood that they must gain:
@@ -57,8 +61,9 @@ FEWEST_SURE = 2
 #: less where they agree.
 ODD, RUN_SURE, TIMES, FEWER, ALL_AGREE = 0.34, 80.0, 1.75, 1.4, 0.95
 #: Least lag, s, that may be that of a low pass, and log-likelihood by which that must be likelier
-#: than a delay; both are as free.
-FILTERED, LIKELIER = 0.012, 3.0
+#: than a delay. The smoothing of the motion is a low pass, too: delays up to 15 ms gain up to 60 by
+#: one, delays from 20 ms on at most 6 (ten logs of ``mistakes.py --seed 7319054``).
+FILTERED, LIKELIER = 0.017, 10.0
 #: How near a lag is to a whole number of samples that is one, s, and in samples.
 WHOLE, MOST_WHOLE = 4e-4, 0.1
 
@@ -432,10 +437,8 @@ class TorqueDelay(Check):
         use = np.isfinite(found.joints) & (found.errors < max(abs(found.common), SMALLEST))
         # nor one whose lag is another in its faster rows, as that of a missing effect
         slow, fast = found.halves.T
-        use &= np.abs(slow - fast) < np.maximum(ALIKE, SAME * np.abs(found.joints))
-        near = max(ALIKE, 0.3 * abs(found.common))
-        alike = np.abs(found.joints[use] - found.common) < np.maximum(near, 2 * found.errors[use])
-        weight = found.gains[use] / max(float(found.gains[use].sum()), 1e-12)
+        same = use & (np.abs(slow - fast) < np.maximum(ALIKE, SAME * np.abs(found.joints)))
+        agreeing, n_alike = _agree(found, same)
         # if positions are late, the torque is early by the same time
         early = measurement.late_position
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
@@ -447,16 +450,19 @@ class TorqueDelay(Check):
         if (
             abs(found.common) > max(SMALLEST, ERRORS * found.error)
             and found.gain > LEAST
-            and alike.sum() >= measurement.n_joints / 2
-            and alike.mean() > 0.5
-            and (alike.mean() >= AGREEING or weight[alike].sum() >= AGREEING)
             and abs(found.common) > _least_lag(measurement)
+            # a low pass delays faster motion less
+            and (agreeing or _agree(found, use)[0])
         ):
             every = range(fits.n_joints)
             lag = refined_lag(fits, found.common, found.error, every)
-            constant = _lowpass(fits, lag, every) if not early else None
+            least = LIKELIER if agreeing else SURE
+            constant = _lowpass(fits, lag, every, least) if not early else None
             if constant is not None:
                 yield self._filtered("torque", "tau", constant, lag)
+                return
+            if not agreeing:
+                yield from self._of_joints(measurement, fits, found)
                 return
             lag = _whole(measurement, lag)
             if abs(lag) < SMALLEST:
@@ -464,19 +470,23 @@ class TorqueDelay(Check):
             ms = 1e3 * lag
             if measurement.of_servos:
                 if lag < 0:
-                    yield self._late_command(-lag, found.error, int(alike.sum()))
+                    yield self._late_command(-lag, found.error, n_alike)
                 return
             late = float(f"{lag + early:.5f}")
             yield self.suspicion(
                 f"torque is {'late' if ms > 0 else 'early'} relative to the motion by about "
                 f"{abs(ms):.1f} ms",
                 "bodies, friction and rotor inertia explain it best at that lag (standard error "
-                f"{1e3 * found.error:.1f} ms, equal in {int(alike.sum())} of "
+                f"{1e3 * found.error:.1f} ms, equal in {n_alike} of "
                 f"{measurement.n_joints} joints)",
                 "suspected",
                 remedy=(f"--late tau={late:g}", f"late={{'tau': {late:g}}}"),
             )
             return
+        yield from self._of_joints(measurement, fits, found)
+
+    def _of_joints(self, measurement: Measurement, fits: Fits, found: Delay) -> Iterator[Suspicion]:
+        """Torques of single joints that are late or early."""
         for k in late_joints(found):
             lag = refined_lag(fits, found.joints[k], found.errors[k], [k])
             constant = _lowpass(fits, lag, [k])
@@ -536,12 +546,23 @@ class TorqueDelay(Check):
         return suspect_lowpass(self, f"the {what}", column, constant, evidence, joints)
 
 
-def _lowpass(fits: Fits, lag: float, late: Sequence[int]) -> float | None:
+def _agree(found: Delay, use: NDArray[np.bool_]) -> tuple[bool, int]:
+    """Whether the lags of some joints are alike, and how many of them are near the common one."""
+    near = max(ALIKE, 0.3 * abs(found.common))
+    alike = np.abs(found.joints[use] - found.common) < np.maximum(near, 2 * found.errors[use])
+    weight = found.gains[use] / max(float(found.gains[use].sum()), 1e-12)
+    count = int(alike.sum())
+    enough = count >= len(use) / 2 and count > len(alike) / 2
+    most = count >= AGREEING * len(alike) or float(weight[alike].sum()) >= AGREEING
+    return enough and most, count
+
+
+def _lowpass(fits: Fits, lag: float, late: Sequence[int], least: float = LIKELIER) -> float | None:
     """Time constant of a low pass that delays torque; None if a pure delay is more likely."""
     if lag < FILTERED:
         return None
     constant, gain = lowpass_of_torque(fits, lag, late)
-    return constant if gain > LIKELIER else None
+    return constant if gain > least else None
 
 
 def _late_motion(measurement: Measurement, fits: Fits, found: Delay) -> LateMotion | None:
@@ -610,9 +631,10 @@ def late_joints(found: Delay) -> list[int]:
         if not np.isfinite(lag) or len(sure) < min(FEWEST_SURE, len(others)):
             continue
         common = float(np.median(sure))
-        apart = abs(lag - common) > max(APART, ERRORS * found.errors[k]) and abs(common) < SMALLEST
+        apart = abs(lag - common) > max(APART, ERRORS * found.errors[k])
+        apart &= abs(common) < max(SMALLEST, LITTLE * abs(lag))
         slow, fast = found.halves[k]
-        if apart and found.gains[k] > SURE and abs(slow - fast) < SAME * abs(lag):
+        if apart and found.gains[k] > ALONE and abs(slow - fast) < SAME * abs(lag):
             late.append(k)
     return late if len(late) < len(found.joints) / 2 or len(found.joints) == 2 else []
 

@@ -34,9 +34,11 @@ MILLIMETRES = 20.0
 LEAST_DEGREES = 6.0
 #: How nearly a factor is a round number that it is taken for.
 WHOLE = 2e-3
-#: Distance of the logarithms of sizes between which a parabola is laid, and how far that at which
-#: identified bodies fit best may be from that of the stated ones.
-APART, NOT_FAR = 0.02, 0.06
+#: First and last step of the search for the logarithm of a size at which identified bodies fit
+#: best, distance of the points of a parabola there, and how far it may be from that of stated ones.
+APART, FINEST, BEND, NOT_FAR = 0.02, 5e-4, 5e-3, 0.06
+#: Log-likelihood with identified bodies by which another factor must be likelier than degrees.
+DECISIVE = 60.0
 #: Share of recordings in which positions may be in another unit, how many times as far they then
 #: spread, and recordings at least.
 FEW, SPREAD, RECORDINGS = 0.4, 10.0, 3
@@ -238,7 +240,7 @@ class PositionUnit(Check):
         else:
             joints = None
         ratio = _fitted_size(measurement, float((largest / limits)[turning].max()), joints)
-        if ratio is not None and not (degrees and abs(ratio * DEGREE - 1) < 0.06):
+        if ratio is not None and not (degrees and _like_degrees(measurement, ratio, joints)):
             value = float(f"{1 / ratio:.4g}")
             moving = dict.fromkeys(both, value)
             words = ",".join(f"{name}={size:g}" for name, size in moving.items())
@@ -330,17 +332,31 @@ def _fitted_size(
     fits = measurement.fits
     if fits is None or least < DISTANT:
         return None
-    sizes = 0.8 * least * 1.03 ** np.arange(60)
+    sizes = 0.8 * least * 1.03 ** np.arange(90)  # up to a tenth of the range of the joint
     likely = np.array([fits.nominal(_sized(x, joints), 2).likelihood.sum() for x in sizes])
     best = int(np.argmax(likely))
-    inflation = max(1.0, float(np.median(fits.nominal(_sized(sizes[best], joints)).inflation)))
     far = np.abs(np.arange(len(sizes)) - best) > 4
-    sure = (likely[best] - likely[far].max()) / inflation > LEAST
+    other = sizes[far][int(np.argmax(likely[far]))]
+    there, elsewhere = (fits.nominal(_sized(x, joints), 2) for x in (sizes[best], other))
+    sure = float(there.margin(elsewhere).sum()) > LEAST
     if not sure or not 0 < best < len(sizes) - 1:
         return None
     finer = sizes[best] * 1.002 ** np.arange(-14, 15)
     likely = np.array([fits.nominal(_sized(x, joints), 2).likelihood.sum() for x in finer])
     return _sharpened(fits, float(finer[int(np.argmax(likely))]), joints)
+
+
+def _like_degrees(measurement: Measurement, ratio: float, joints: frozenset[int] | None) -> bool:
+    """Whether positions may be degrees, although another factor fits better.
+
+    A usual unit is likelier than a gear before which position was measured, unless bodies of any
+    mass decide.
+    """
+    fits = measurement.fits
+    if abs(ratio * DEGREE - 1) < 0.06 or fits is None:
+        return True
+    there, degrees = (fits.identified(_sized(x, joints)) for x in (ratio, 1 / DEGREE))
+    return float(there.margin(degrees).sum()) < DECISIVE
 
 
 def _sized(size: float, joints: frozenset[int] | None) -> Reading:
@@ -359,16 +375,18 @@ def _sharpened(fits: Fits, size: float, joints: frozenset[int] | None) -> float:
         return float(np.sum(outcome.likelihood / inflation))
 
     first = log = float(np.log(size))
-    step, error = APART, NOT_FAR
-    for _ in range(4):
-        left, middle, right = (likelihood(log + x) for x in (-step, 0.0, step))
-        bend = 2 * middle - left - right
-        if bend <= 0:
-            return size  # bodies compensate any size
-        error = step / np.sqrt(bend)
-        log += float(np.clip(0.5 * step * (right - left) / bend, -2 * step, 2 * step))
-        step /= 2
-    if abs(log - first) > NOT_FAR or error > NOT_FAR:
+    step, best = APART, likelihood(log)
+    while step > FINEST and abs(log - first) <= NOT_FAR:  # the maximum is narrow without noise
+        near, other = max((likelihood(x), x) for x in (log - step, log + step))
+        if near > best:
+            best, log = near, other
+        else:
+            step /= 2
+    bend = 2 * best - likelihood(log - BEND) - likelihood(log + BEND)
+    if bend <= 0 or abs(log - first) > NOT_FAR:
+        return size  # bodies compensate any size
+    error = BEND / np.sqrt(bend)
+    if error > NOT_FAR:
         return size
     found = float(np.exp(log))
     for whole in (10, 5, 1):

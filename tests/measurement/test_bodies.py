@@ -6,7 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_scara, load_ur5, make_hidden_effect_log
+from skidyn.datasets import (
+    load_planar_arm,
+    load_scara,
+    load_ur5,
+    make_hidden_effect_log,
+)
 from skidyn.logs import check_log
 from skidyn.measurement import Measurement, check_measurement
 
@@ -87,3 +92,40 @@ def test_a_unit_beside_an_effect_as_large_as_the_torque_of_the_bodies():
     told = {s.check: s for s in check_log(log.frame.assign(**torque), robot).checks}
     assert told["torque_scale"].remedy.option == "--units tau=Nmm"
     assert "torque_scale" not in {s.check for s in check_log(log.frame, robot).checks}
+
+
+@pytest.fixture(scope="module")
+def wrist():
+    robot = load_ur5()
+    return robot, make_hidden_effect_log(robot, "stribeck", n_trajectories=5, random_state=7).frame
+
+
+def test_a_last_joint_with_friction_alone_is_in_the_unit_of_the_one_before(wrist):
+    robot, frame = wrist
+    both = frame.assign(**{n: 1e3 * frame[n] for n in ("tau5", "tau6")})
+    (told,) = [s for s in check_log(both, robot).checks if s.certainty != "noted"]
+    assert told.joints == (5, 6) and told.remedy.option == "--gain tau5=0.001,tau6=0.001"
+    alone = check_log(frame.assign(tau6=1e3 * frame["tau6"]), robot).checks
+    (told,) = [s for s in alone if s.check == "torque_scale"]
+    assert told.certainty == "noted" and told.joints == (6,)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_rate_that_leaves_the_scale_of_every_torque(factor):
+    robot = load_planar_arm()
+    frame = make_hidden_effect_log(
+        robot, None, n_trajectories=5, duration=6.0, random_state=7319358
+    ).frame
+    speeds = {n: frame[n] / factor for n in ("dq1", "dq2")}
+    frame = frame.assign(time=frame["time"] * factor, **speeds)
+    (told,) = [s for s in check_log(frame, robot).checks if s.certainty != "noted"]
+    assert told.remedy.option == f"--gain time={1 / factor:g},dq={factor:g}"
+
+
+def test_slow_noise_that_a_function_of_the_position_could_follow(recorded, told_of):
+    rng = np.random.default_rng(6)
+    frame = recorded.frame.copy()
+    for _, own in frame.groupby("trajectory"):
+        wave = np.convolve(rng.normal(size=len(own) + 400), np.hanning(200), "same")[200:-200]
+        frame.loc[own.index, "tau2"] = wave * frame["tau2"].std() / wave.std()
+    assert told_of(frame)["unexplained"].joints == (2,)

@@ -68,3 +68,13 @@ def test_a_torque_of_one_sign_before_drives_are_enabled_is_not_cut(recorded, tol
     told = told_of(frame)
     assert told["constant_torque"].certainty == "certain"
     assert "is clipped at zero" not in str(told.get("unsigned_torque", ""))
+
+
+def test_a_dead_band_explains_zeros_at_the_ends(recorded, told_of):
+    frame = recorded.frame.copy()
+    for name in ("tau1", "tau2"):
+        least = 0.15 * frame[name].abs().quantile(0.95)
+        frame[name] = frame[name].where(frame[name].abs() >= least, 0.0)
+    frame.loc[frame.groupby("trajectory").head(12).index, ["tau1", "tau2"]] = 0.0
+    told = told_of(frame)
+    assert "dead_band" in told and "constant_torque" not in told

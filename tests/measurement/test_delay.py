@@ -61,3 +61,15 @@ def test_one_recording_that_is_late():
 def test_torque_that_is_late_by_more_than_the_usual_lags():
     (told,) = late(lambda t: np.full_like(t, 0.11))
     assert float(told.remedy.option.partition("=")[2]) == pytest.approx(0.11, abs=0.01)
+
+
+def test_one_recording_that_is_late_by_more_than_the_usual_lags():
+    robot = load_ur5()
+    frame = make_hidden_effect_log(robot, None, n_trajectories=5, random_state=3).frame
+    rows = frame["trajectory"] == 2
+    for k in range(1, 7):
+        clock = frame.loc[rows, "time"]
+        frame.loc[rows, f"tau{k}"] = np.interp(clock - 0.055, clock, frame.loc[rows, f"tau{k}"])
+    (told,) = [s for s in check_log(frame, robot).checks if s.certainty != "noted"]
+    text, _, lag = told.suspicion.removesuffix(" ms relative to the others").rpartition(" ")
+    assert text == "in trajectory 2 torque is late by about" and abs(float(lag) - 55) < 10

@@ -3,7 +3,7 @@
 
 import pytest
 
-from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 from skidyn.robots import Robot
 
@@ -67,3 +67,25 @@ def test_a_payload_that_multiplies_the_load_of_a_wrist_is_no_mistake():
 def test_a_robot_of_sliders_alone_has_no_zeros_to_divide():
     frame = make_hidden_effect_log(GANTRY, "friction_drift", **OPTIONS).frame
     assert not [s for s in check_log(frame, GANTRY).checks if s.certainty != "noted"]
+
+
+@pytest.mark.parametrize("factor, what", [(-1, "opposite sign"), (10, " times that of")])
+def test_a_spring_that_is_missing_does_not_hide_them(factor, what):
+    arm = load_planar_arm()
+    options = {"n_trajectories": 5, "duration": 6.0, "random_state": 7319357}
+    frame = make_hidden_effect_log(arm, "spring", **options).frame
+    frame.loc[frame["trajectory"] > 3, "tau2"] *= factor
+    (one,) = [s for s in check_log(frame, arm).checks if s.certainty != "noted"]
+    assert one.check == "divided_recordings" and one.joints == (2,)
+    assert "in trajectories 4, 5 " in one.suspicion and what in one.suspicion
+
+
+def test_zeros_of_two_of_many_recordings_are_told_from_those_of_one():
+    arm = load_planar_arm()
+    options = {"n_trajectories": 10, "duration": 3.0, "random_state": 5}
+    frame = make_hidden_effect_log(arm, None, **options).frame
+    out = [2, 5, 6, 9]
+    frame.loc[frame["trajectory"].isin(out), "q2"] += 0.7
+    (one,) = [s for s in check_log(frame, arm).checks if s.certainty != "noted"]
+    assert one.check == "divided_recordings" and one.joints == (2,)
+    assert "in trajectories 2, 5, 6, 9 the zero" in one.suspicion

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_panda, load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_panda, load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 
 
@@ -109,3 +109,24 @@ def test_gravity_that_was_removed_with_bodies_that_are_not_those_of_the_robot():
     changes = dict(zip(names, (log.frame[names].to_numpy() - pull).T, strict=True))
     told = {s.check: s for s in check_log(log.frame.assign(**changes), robot).checks}["reading"]
     assert told.remedy.option == "--restore-gravity"
+
+
+def test_a_zero_of_a_last_joint_is_noted_beside_a_load():
+    arm = load_planar_arm()
+    options = {"n_trajectories": 5, "duration": 6.0, "random_state": 7319358}
+    frame = make_hidden_effect_log(arm, None, **options).frame
+    assert "reading" not in {s.check for s in check_log(frame, arm).checks}
+    told = check_log(frame.assign(q2=frame["q2"] - 1.3), arm).checks
+    (one,) = [s for s in told if s.check == "reading"]
+    assert one.certainty == "noted" and one.suspicion.startswith("either the zero of joint 2")
+    assert one.remedy.option.startswith("--zero q2=-1.")
+
+
+def test_the_angle_of_a_first_joint_is_not_taken_for_gravity_along_an_axis():
+    arm = load_planar_arm()
+    options = {"n_trajectories": 5, "duration": 6.0, "random_state": 7319358}
+    frame = make_hidden_effect_log(arm, None, **options).frame
+    told = check_log(frame.assign(q1=frame["q1"] - 1.274), arm).checks
+    (one,) = [s for s in told if s.check == "reading"]
+    name, _, angle = one.remedy.option.partition("=")
+    assert name == "--zero q1" and float(angle) == pytest.approx(-1.274, abs=0.02)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 
 ROBOT = load_planar_arm()
@@ -51,3 +51,18 @@ def test_torque_between_the_values_of_a_slower_bus_is_told_alone(change, way):
 
 def test_torque_that_was_measured_in_every_row():
     assert told_of() == {}
+
+
+def test_joints_whose_noise_hides_the_bus_are_shown_by_the_others():
+    robot = load_ur5()
+    frame = make_hidden_effect_log(robot, None, n_trajectories=5, random_state=4).frame
+    rng = np.random.default_rng(1)
+    for _, own in frame.groupby("trajectory"):
+        t = own["time"].to_numpy()
+        few = np.arange(0, len(t), 6)
+        for k in range(1, 7):
+            x = own[f"tau{k}"].to_numpy()
+            noise = 0.02 * np.std(np.diff(x[few])) * rng.normal(size=len(x))
+            frame.loc[own.index, f"tau{k}"] = line(t, x, few) + noise
+    told = {s.check for s in check_log(frame, robot).checks if s.certainty != "noted"}
+    assert told == {"slow_torque"}

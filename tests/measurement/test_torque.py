@@ -43,3 +43,32 @@ def test_torque_of_one_joint_that_is_late(arm, told_of):
     late = frame.groupby("trajectory")["tau2"].shift(3).bfill()
     told = told_of(frame.assign(tau2=late))["torque_delay"]
     assert told.joints == (2,) and told.remedy.option.startswith("--late tau2=0.0")
+
+
+def test_a_spring_that_is_missing_does_not_hide_the_lag_of_its_joint(arm, told_of):
+    log = make_hidden_effect_log(
+        arm, "spring", n_trajectories=5, duration=6.0, random_state=7319357
+    )
+    late = log.frame.groupby("trajectory")["tau2"].shift(3).bfill()
+    told = told_of(log.frame.assign(tau2=late))["torque_delay"]
+    assert told.joints == (2,) and told.remedy.option.startswith("--late tau2=0.0")
+
+
+def test_a_delay_between_two_samples_is_no_low_pass():
+    robot = load_scara()
+    frame = make_hidden_effect_log(robot, None, n_trajectories=5, random_state=7319254).frame
+    names = [f"tau{k}" for k in range(1, 5)]
+    for _, run in frame.groupby("trajectory"):
+        for name in names:
+            frame.loc[run.index, name] = np.interp(run["time"] - 0.014, run["time"], run[name])
+    told = {s.check: s for s in check_log(frame, robot).checks}["torque_delay"]
+    assert told.remedy.option.startswith("--late tau=0.01")
+
+
+def test_loads_of_single_recordings_do_not_hide_the_lag_of_a_joint(arm, told_of):
+    log = make_hidden_effect_log(
+        arm, "payload", n_trajectories=5, duration=6.0, random_state=7319354
+    )
+    late = log.frame.groupby("trajectory")["tau2"].shift(3).bfill()
+    told = told_of(log.frame.assign(tau2=late))["torque_delay"]
+    assert told.joints == (2,) and told.remedy.option.startswith("--late tau2=0.0")
