@@ -209,7 +209,10 @@ class Signals:
 
     def with_(self, **changes: Any) -> Signals:
         """Copy with some fields replaced; a torque of the model may be a function returning it."""
-        return replace(self, **{k: f.stored(self) for k, f in _LATER.items()} | changes)
+        new = replace(self, **{k: f.stored(self) for k, f in _LATER.items()} | changes)
+        if not {"dq", "prismatic"} & set(changes) and "sign" in self.__dict__:
+            new.__dict__["sign"] = self.sign
+        return new
 
     def take(self, rows: slice | NDArray[Any]) -> Signals:
         """The same signals on some rows."""

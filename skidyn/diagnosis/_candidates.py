@@ -157,7 +157,8 @@ def catalogue_candidates(
         effect = get_effect(kind)
         if effect.search == "trajectories" and not problem.rigid_body and problem.robot is not None:
             # With the URDF's own bodies even a permanent load can be detected.
-            terms.append(Term.at(kind, tuple(range(problem.n_joints))))
+            joints = tuple(range(problem.n_joints))
+            terms += [Term.at(kind, joints, shape) for shape in effect.grid(few, joints)]
             continue
         if effect.search != "grid" or ("robot" in effect.needs and problem.robot is None):
             continue

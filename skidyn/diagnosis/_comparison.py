@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -114,9 +115,37 @@ class Comparison:
                 )
         return rows
 
+    @cached_property
+    def _regimes(self) -> dict[str, NDArray[np.bool_]]:
+        s = self.signals
+        speed = np.abs(s.dq)
+        rest = speed <= REST * s.unit
+        high = np.array(
+            [
+                np.quantile(v[~r], 0.95) if (~r).any() else 1.0
+                for v, r in zip(speed.T, rest.T, strict=True)
+            ]
+        )
+        reversal = ~rest & ~self.sliding
+        moving = ~rest & ~reversal
+        load = np.abs(self.measured if s.load is None else s.load)
+        if s.temperature is not None:
+            warmth = s.temperature
+        else:
+            warmth = np.repeat(s.clock[:, None], s.n_joints, axis=1)
+        return {
+            "rest": rest,
+            "reversal": reversal,
+            "slow": moving & (speed < SLOW * high),
+            "medium": moving & (speed >= SLOW * high) & (speed <= FAST * high),
+            "fast": moving & (speed > FAST * high),
+            "loaded": moving & (load > np.quantile(load, 0.8, axis=0)),
+            "warm": moving & (warmth > np.quantile(warmth, 0.8, axis=0)),
+        }
+
 
 def regimes(comparison: Comparison) -> dict[str, NDArray[np.bool_]]:
-    """Samples of every regime, per joint.
+    """Samples of every regime, per joint; not to be changed, since they are computed once.
 
     Parameters
     ----------
@@ -127,31 +156,7 @@ def regimes(comparison: Comparison) -> dict[str, NDArray[np.bool_]]:
     -------
     dict of str to ndarray of shape (n_samples, n_joints) of bool
     """
-    s = comparison.signals
-    speed = np.abs(s.dq)
-    rest = speed <= REST * s.unit
-    high = np.array(
-        [
-            np.quantile(v[~r], 0.95) if (~r).any() else 1.0
-            for v, r in zip(speed.T, rest.T, strict=True)
-        ]
-    )
-    reversal = ~rest & ~comparison.sliding
-    moving = ~rest & ~reversal
-    load = np.abs(comparison.measured if s.load is None else s.load)
-    if s.temperature is not None:
-        warmth = s.temperature
-    else:
-        warmth = np.repeat(s.clock[:, None], s.n_joints, axis=1)
-    return {
-        "rest": rest,
-        "reversal": reversal,
-        "slow": moving & (speed < SLOW * high),
-        "medium": moving & (speed >= SLOW * high) & (speed <= FAST * high),
-        "fast": moving & (speed > FAST * high),
-        "loaded": moving & (load > np.quantile(load, 0.8, axis=0)),
-        "warm": moving & (warmth > np.quantile(warmth, 0.8, axis=0)),
-    }
+    return comparison._regimes
 
 
 def error_map(comparison: Comparison) -> Array:

@@ -103,7 +103,8 @@ def conclude(
             [_mean_error(c), entry["rmse"], average]
             for c, entry, average in zip(comparisons, history, averages, strict=True)
         ]
-        useless = _useless(problem, result, errors, residual, least_drop)
+        noise = sensor_noise(problem.signals, residual), position_noise(problem, result.fit)
+        useless = _useless(problem, result, errors, noise, least_drop)
         useless = useless or _vague(problem, result.findings, fixed)
         useless = useless or _impossible(result.findings, fixed)
         if useless is None:
@@ -134,7 +135,7 @@ def conclude(
             findings.append(finding)
     share = predictable_share(problem, result.fit.residual)
     rmse = np.array(history[-1]["rmse"])
-    parts = find_remainder(problem, result.fit, residual, torque, rmse, share)
+    parts = find_remainder(problem, result.fit, noise, torque, rmse, share)
     least = np.maximum(
         EPISODE_LEAST_RANGE * torque_range(torque), EPISODE_LEAST_NOISE * parts.noise
     )
@@ -246,7 +247,7 @@ def _useless(
     problem: Problem,
     result: SearchResult,
     errors: Sequence[Sequence[Sequence[float]]],
-    residual: Array,
+    noise: tuple[Array, Array],
     least: float,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms that do not reduce the error of samples, and these terms.
@@ -258,10 +259,8 @@ def _useless(
     Where the noise of positions exceeds that of the torque, it dominates the error of samples, and
     changes with the inertia of the model: there the held-out error of averaged rows counts.
     """
-    if not result.findings:
-        return None
-    sensor = np.nan_to_num(sensor_noise(problem.signals, residual))
-    coarse = position_noise(problem, result.fit) > sensor
+    sensor, position = noise
+    coarse = position > np.nan_to_num(sensor)
     for k in reversed(range(len(result.findings))):
         terms = []
         for candidate in result.findings[k].candidates:

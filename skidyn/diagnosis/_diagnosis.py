@@ -19,6 +19,7 @@ from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning
 from skidyn._memory import give_back
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
+from skidyn.diagnosis._beginnings import look_after_beginnings
 from skidyn.diagnosis._conclusion import conclude
 from skidyn.diagnosis._confidence import in_doubt
 from skidyn.diagnosis._correction import is_physics, open_model
@@ -316,7 +317,10 @@ def _diagnose(
         if not alone():
             problem = posed()  # without data of the previous search
         found = _search(problem, kinds, settings, vibration=steady)
-    result, wider, completed = found
+    problem, (result, wider, completed), left_out = look_after_beginnings(
+        problem, found, lambda later: _search(later, kinds, settings, vibration=steady)
+    )
+    notes += [left_out] if left_out else []
     limits = _limits(problem, result, completed, settings)
     give_back()
     sliding = problem.rows.sliding

@@ -265,15 +265,23 @@ def told_briefly(
     trajectories: tuple[int, ...] | None,
     parameters: dict[str, dict[str, Any]],
 ) -> str:
-    """Effect, joints, and its first parameter, without a full stop."""
+    """Effect, joints, and its first parameter or vector, without a full stop."""
     where = f"joint {joints[0]}" if len(joints) == 1 else f"joints {', '.join(map(str, joints))}"
     if trajectories is not None:
         many = "y" if len(trajectories) == 1 else "ies"
         where += f" in trajector{many} {', '.join(map(str, trajectories))}"
-    # of the components of a vector, one that is not zero
+    # the first that is not zero, with the other components of its vector
     rows = sorted(parameters.items(), key=lambda item: _may_be_zero(item[1]))
-    what = next((_value(name, row) for name, row in rows), "")
-    return f"{title} on {where}{what}"
+    stem = _stem(rows[0][0]) if rows else ""
+    own = [_value(name, row) for name, row in parameters.items() if _stem(name) == stem]
+    sizes = ", ".join(filter(None, own))
+    return f"{title} on {where}: {sizes}" if sizes else f"{title} on {where}"
+
+
+def _stem(name: str) -> str:
+    """Name of the vector of which a parameter is a component, else its own."""
+    stem, _, axis = name.rpartition("_")
+    return stem if axis in ("x", "y", "z") else name
 
 
 def _fall_told(drop: float) -> str:
@@ -293,7 +301,7 @@ def _value(name: str, row: dict[str, Any]) -> str:
     """Text of a parameter of a finding."""
     value, unit = row["value"], "" if row["unit"] == "1" else f" {row['unit']}".rstrip()
     if isinstance(value, float) and row["low"] is not None:
-        return f": {name} = {give_or_take(value, (row['high'] - row['low']) / 2)}{unit}"
+        return f"{name} = {give_or_take(value, (row['high'] - row['low']) / 2)}{unit}"
     return ""
 
 

@@ -64,8 +64,8 @@ def predictable_share(problem: Problem, residual: Sequence[Array]) -> Array:
 def _inputs(problem: Problem, joint: int) -> Array:
     """Averaged signals at the rows of a joint, standardised."""
     s = problem.signals
-    raw = np.column_stack([s.q, s.dq, s.sign[:, joint], s.ddq[:, joint]])
-    x = average_at_rows(problem, joint, raw)
+    raw = s.q, s.dq, s.sign[:, joint], s.ddq[:, joint]
+    x = np.column_stack([average_at_rows(problem, joint, values) for values in raw])
     scale = x.std(0)
     keep = scale > 1e-9
     scaled: Array = (x[:, keep] - x[:, keep].mean(0)) / scale[keep]

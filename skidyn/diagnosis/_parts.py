@@ -280,9 +280,9 @@ def part_candidates(
         if not parts:
             continue
         part, candidate = max(parts, key=lambda item: item[0].drop)
-        inside = within(problem, candidate, part.recordings)
         if part.drop <= least:
             continue
+        inside = within(problem, candidate, part.recordings)
 
         def passes(chance: float, inside: Candidate = inside) -> bool:
             return significant(chance, inside)

@@ -161,11 +161,8 @@ class RankingSearch(SearchState):
         pool, errors, model, now = wanted.copy(), first, base, base.errors
         index: list[int] = []
         chosen: list[Candidate] = []
-        widths = np.array([c.width for c in self.pool])
         # A further form was chosen from all possible ones, so it must be better by this much.
-        further = self.settings.least_gain * np.array(
-            [c.is_further_form for c in self.pool], dtype=float
-        )
+        further = self.settings.least_gain * screen.further_forms
         while pool.any():
             drops = np.where(pool, now.sum() - errors.sum(1), -np.inf)
             # Unknown functions have very different numbers of coefficients: each coefficient has a
@@ -173,7 +170,8 @@ class RankingSearch(SearchState):
             price = 2.0
             if self.pool[int(np.argmax(drops))].kind == UNKNOWN:
                 price = self._price([self.pool[int(np.argmax(drops))]], chosen) / 3
-            found = self._first_significant(drops, drops - price * widths - further, tester)
+            order = drops - price * screen.widths - further
+            found = self._first_significant(drops, order, tester, chosen)
             if found is None:
                 break
             candidate = self.pool[found]
@@ -187,32 +185,44 @@ class RankingSearch(SearchState):
                 tester = self.tester([*self.chosen, *chosen])
         return index, float(base.errors.sum() - now.sum())
 
-    def _first_significant(self, drops: Array, order: Array, tester: Tester) -> int | None:
-        """The first of the best few candidates that is large enough and significant."""
+    def _first_significant(
+        self, drops: Array, order: Array, tester: Tester, chosen: Sequence[Candidate]
+    ) -> int | None:
+        """The first of the best few candidates that is large enough and significant.
+
+        Between the shapes of the grid lie others, such as planes of other directions, that remove
+        more: if none is significant among all that were tried, the first that is by itself is
+        tested with its shape refined, as it will be judged later.
+        """
+        near = None
         for i in np.argsort(-order)[: self.settings.shapes_tested]:
             candidate = self.pool[i]
             n_rows = int(self.problem.rows.counts[list(candidate.joints)].sum())
             if not drops[i] > self.settings.least_share * n_rows:
                 continue
             passes = partial(self.significant, candidate=candidate)
-            if passes(tester.test(candidate.rows, candidate.zeros, passes).chance):
+            chance = tester.test(candidate.rows, candidate.zeros, passes).chance
+            if passes(chance):
                 return int(i)
-        return None
+            if near is None and candidate.n_shapes and chance < self.settings.level:
+                near = int(i)
+        if near is None:
+            return None
+        model = self.blocks_with([*self.chosen, *chosen])
+        (refined,) = refine(self.problem, model, [self.pool[near]], self.sigma, self.target)
+        chance = tester.test(refined.rows, refined.zeros).chance
+        return near if self.significant(chance, refined) else None
 
     def _still_open(self, added: Candidate, chosen: list[Candidate]) -> Mask:
         """Candidates that may be added to one of the same kind."""
         if len(added.joints) == self.problem.n_joints and self.problem.n_joints > 1:
             return np.zeros(len(self.pool), dtype=bool)  # acts on the whole robot already
         if added.kind == UNKNOWN:
-            same = {added.variables}
+            same = set(added.variables)
             if len(chosen) >= 3:
                 return np.zeros(len(self.pool), dtype=bool)
             return np.array(
-                [
-                    set(c.variables) == set(v) and c.joints != added.joints
-                    for c in self.pool
-                    for v in same
-                ]
+                [c.joints != added.joints and set(c.variables) == same for c in self.pool]
             )
         taken = {c.joints for c in chosen}
         whole = self.problem.n_joints > 1
@@ -224,10 +234,10 @@ class RankingSearch(SearchState):
         )
 
     def _splits(self) -> list[tuple[list[Candidate], float]]:
-        """Payloads and tool forces of some trajectories, once."""
-        if any(c.term.effect.search == "trajectories" for c in self.chosen):
-            return []
-        splits = split_effects(self.problem, self.kinds, self.blocks, self.sigma, self.target)
+        """Payloads and tool forces of some trajectories."""
+        splits = split_effects(
+            self.problem, self.kinds, self.blocks, self.sigma, self.target, self.chosen
+        )
         found = []
         for split in splits:
             if split.drop.sum() > 0:
@@ -246,8 +256,14 @@ class RankingSearch(SearchState):
         tester = self.tester(self.chosen)
         if tester.test(candidate.rows).coefficients[0] >= 0:
             return candidate
+        loaded = {
+            k
+            for c in [*self.chosen, candidate]
+            if c.kind == candidate.kind
+            for k in c.term.trajectories or ()
+        }
         names = self.problem.rows.recordings.tolist()
-        rest = tuple(name for name in names if name not in candidate.term.trajectories)
+        rest = tuple(name for name in names if name not in loaded)
         term = candidate.term.with_shape(trajectories=rest)
         other = replace(candidate, term=term, rows=self.problem.term_rows(term))
         return other if tester.test(other.rows).coefficients[0] > 0 else candidate

@@ -106,7 +106,7 @@ def root_mean_square(values: Array) -> float:
 def find_remainder(
     problem: Problem,
     fit: Fit,
-    residual: Array,
+    noises: tuple[Array, Array],
     torque: Array,
     rmse: Array,
     share: Array,
@@ -119,8 +119,8 @@ def find_remainder(
         Motion and rows.
     fit : Fit
         Fit of the completed model, with the residual of averaged rows.
-    residual : ndarray of shape (n_samples, n_joints), N m or N
-        Held-out residual of the completed model.
+    noises : tuple of two ndarrays of shape (n_joints,), N m or N
+        Noise of the torque sensor, and of positions (:func:`position_noise`).
     torque : ndarray of shape (n_samples, n_joints), N m or N
         Measured torque.
     rmse : ndarray of shape (n_joints,), N m or N
@@ -128,8 +128,7 @@ def find_remainder(
     share : ndarray of shape (n_joints,)
         Share of the squared error of averaged rows that is predictable.
     """
-    sensor = sensor_noise(problem.signals, residual)
-    position, averaged = position_noise(problem, fit), fit.residual
+    (sensor, position), averaged = noises, fit.residual
     noise = np.hypot(np.nan_to_num(sensor), position)
     excess = np.maximum(rmse**2 - noise**2, 0.0)
     predictable = np.sqrt(np.minimum(share * rmse**2, excess))

@@ -35,6 +35,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,6 +125,14 @@ REVERSAL_STANDS_OUT = 2.0
 REVERSAL_FEWEST_ROWS, REVERSAL_AWAY = 20, 0.6
 #: Least share of a joint's squared error that hysteresis must remove there.
 REVERSAL_LEAST_SHARE = 0.06
+
+#: A link that swings when a recording begins (``_beginnings.py``): damping ratio and share of the
+#: oscillation that determine how long it is left out (gears have ratios of .02 to .1), its
+#: resonance, Hz, if none is known yet, share of it below which it is another one, and squared error
+#: of the beginnings over that of later motion from which they are left out.
+BEGINNING_DAMPING, BEGINNING_LEFT, BEGINNING_RESONANCE = 0.02, float(np.log(10.0)), 9.0
+BEGINNING_ALIKE = 0.8
+BEGINNING_STANDS_OUT = 2.0
 
 #: Windows, in s, for effects that move the link (``_swift.py``): crossing a play of a few mrad
 #: takes as long.
@@ -462,11 +471,12 @@ class Tester:
         own = np.asarray(sum(np.sum((b / self.sigma[j]) ** 2, axis=0) for j, b in rows.items()))
         gram = np.asarray(sum(z.T @ z for z in new))
         # Columns that the model can represent have no information.
-        told = np.diag(gram) > np.maximum(NEW_SHARE * own, 0.0)
+        told = gram.diagonal() > np.maximum(NEW_SHARE * own, 0.0)
         if not told.any():
             return Test(1.0, np.zeros(k), 0.0)
-        new, gram, k = [z[:, told] for z in new], gram[np.ix_(told, told)], int(told.sum())
-        size = np.sqrt(np.diag(gram))
+        if k > 1:
+            new, gram, k = [z[:, told] for z in new], gram[np.ix_(told, told)], int(told.sum())
+        size = np.sqrt(gram.diagonal())
         new, gram = [z / size for z in new], gram / size[:, None] / size
         score = np.asarray(sum(z.T @ e for z, e in zip(new, residual, strict=True)))
         b = np.linalg.solve(gram + RIDGE * np.eye(k), score)
@@ -502,12 +512,14 @@ class Tester:
         both = cross.T @ mimic
         gram = own - both - both.T + mimic.T @ (self._gram @ mimic)
         score = score - mimic.T @ self._left
-        told = np.diag(gram) > np.maximum(NEW_SHARE * np.diag(own), 0.0)
+        told = gram.diagonal() > np.maximum(NEW_SHARE * own.diagonal(), 0.0)
         coefficients, k = np.zeros(len(told)), int(told.sum())
         if not k:
             return Test(1.0, coefficients, 0.0)
-        size = np.sqrt(np.diag(gram)[told])
-        gram, score = gram[np.ix_(told, told)] / size[:, None] / size, score[told] / size
+        if k < len(told):
+            gram, score = gram[np.ix_(told, told)], score[told]
+        size = np.sqrt(gram.diagonal())
+        gram, score = gram / size[:, None] / size, score / size
         b = np.linalg.solve(gram + RIDGE * np.eye(k), score)
         coefficients[told] = b / size
         drop = float(score @ b)
@@ -534,11 +546,11 @@ class Tester:
         block, count = time_blocks(self.problem, min(max(SHORTEST_BLOCK, length), longest))
         index = np.concatenate(block)
         order = np.argsort(index, kind="stable")
-        ends = np.searchsorted(index[order], np.arange(1, count))
-        columns = np.split(np.concatenate(new)[order], ends)
-        residual = np.split(np.concatenate(left)[order], ends)
-        sums = np.array([z.T @ r for z, r in zip(columns, residual, strict=True)])
-        grams = np.array([z.T @ z for z in columns])
+        edges = np.searchsorted(index[order], np.arange(count + 1)).tolist()
+        columns, residual = np.concatenate(new)[order], np.concatenate(left)[order]
+        parts = [slice(*pair) for pair in pairwise(edges)]
+        sums = np.array([columns[rows].T @ residual[rows] for rows in parts])
+        grams = np.array([columns[rows].T @ columns[rows] for rows in parts])
         return chance_of_score(*unbiased_scores(score, sums, grams), unbiased=True)
 
 
@@ -671,15 +683,13 @@ def variance_inflation(
     """
     inflation = np.ones(len(joints))
     for i, (j, r) in enumerate(zip(joints, residual, strict=True)):
-        trajectory = problem.rows.trajectory[j]
-        order = np.lexsort((problem.rows.time[j], trajectory))
-        x, name = r[order], trajectory[order]
+        x = r[problem.rows.in_time(j)]
         power = float(x @ x)
         if power <= 0:
             continue
         for lag in range(1, min(MOST_LAGS, len(x))):
-            alike = name[:-lag] == name[lag:]
-            rho = float(x[:-lag][alike] @ x[lag:][alike]) / power
+            earlier = problem.rows.earlier(j, lag)
+            rho = float(x[earlier] @ x[earlier + lag]) / power
             if rho < SMALL:
                 break
             inflation[i] += 2 * rho

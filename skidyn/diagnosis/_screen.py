@@ -94,6 +94,16 @@ class Screen:
         self.candidates = list(candidates)
         self._groups = self._group()
 
+    @cached_property
+    def widths(self) -> NDArray[np.int64]:
+        """Number of coefficients of every candidate, (n_candidates,)."""
+        return np.array([c.width for c in self.candidates])
+
+    @cached_property
+    def further_forms(self) -> Array:
+        """1 for candidates in a further form of their kind, else 0; (n_candidates,)."""
+        return np.array([float(c.is_further_form) for c in self.candidates])
+
     def _folded(self, a: Array, b: Array, joint: int) -> Array:
         """Products a.T @ b of every fold, shape (n_folds, columns of a, columns of b)."""
         return np.stack([a[rows].T @ b[rows] for rows in self.folds[joint]])

@@ -49,6 +49,7 @@ def split_effects(
     blocks: Sequence[dict[int, Array]],
     sigma: Array,
     target: Sequence[Array],
+    known: Sequence[Candidate] = (),
 ) -> list[Split]:
     """Best splits of the trajectories for each kind of effect that needs one.
 
@@ -66,33 +67,56 @@ def split_effects(
         Noise of one row.
     target : sequence of ndarray
         Averaged torque.
+    known : sequence of Candidate
+        Effects of the model that were found. The trajectories of a payload are not split again:
+        another payload is one of other trajectories.
     """
     names = problem.rows.recordings
     if problem.robot is None or len(names) < 2:
         return []
     y = [t / s for t, s in zip(target, sigma, strict=True)]
+    joints = tuple(range(problem.n_joints))
+    model = felt_columns(problem, blocks, sigma)
     found = []
     for kind in kinds:
         effect = get_effect(kind)
         if effect.search != "trajectories":
             continue
-        term = Term.at(kind, tuple(range(problem.n_joints)))
-        rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
-        products = _Products.of(problem, felt_columns(problem, blocks, sigma), y, rows, names)
-        own = products.own_estimates(effect.leading or term.width)
-        groups = _splits(effect.grows, own, names)
-        alone = {name: products.drop(names == name) for name in {n for g in groups for n in g}}
-        together = [(products.drop(np.isin(names, group)), group) for group in groups]
-        # Separate sizes in most recordings can be due to any missing slow torque.
-        few = [group for group in groups if 3 * len(group) <= 2 * len(names)]
-        apart = [(np.sum([alone[name] for name in group], axis=0), group) for group in few]
-        for drops, is_apart in ((together, False), (apart, True)):
-            if not drops:
-                continue
-            drop, chosen = max(drops, key=lambda item: float(item[0].sum()))
-            split = term.with_shape(trajectories=tuple(sorted(int(name) for name in chosen)))
-            rows = rows_within(problem, problem.term_rows(term), chosen)
-            found.append(Split(Candidate(kind, split, rows), drop, is_apart))
+        taken = {k for c in known if c.kind == kind for k in c.term.trajectories or names}
+        free = ~np.isin(names, list(taken))
+        if free.sum() < 2:
+            continue
+        for shape in effect.grid(problem.few, joints):
+            term = Term.at(kind, joints, shape)
+            rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
+            products = _Products.of(problem, model, y, rows, names)
+            found += _best_splits(problem, term, products, names, free)
+    return found
+
+
+def _best_splits(
+    problem: Problem,
+    term: Term,
+    products: _Products,
+    names: NDArray[Any],
+    free: NDArray[np.bool_],
+) -> list[Split]:
+    """The best split for the same effect in its trajectories, and that for separate sizes."""
+    own = products.own_estimates(term.effect.leading or term.width, free)
+    groups = _splits(term.effect.grows, own, names[free])
+    alone = {name: products.drop(names == name) for name in {n for g in groups for n in g}}
+    together = [(products.drop(np.isin(names, group)), group) for group in groups]
+    # Separate sizes in most recordings can be due to any missing slow torque.
+    few = [group for group in groups if 3 * len(group) <= 2 * len(names)]
+    apart = [(np.sum([alone[name] for name in group], axis=0), group) for group in few]
+    found = []
+    for drops, is_apart in ((together, False), (apart, True)):
+        if not drops:
+            continue
+        drop, chosen = max(drops, key=lambda item: float(item[0].sum()))
+        split = term.with_shape(trajectories=tuple(sorted(int(name) for name in chosen)))
+        rows = rows_within(problem, problem.term_rows(term), chosen)
+        found.append(Split(Candidate(term.kind, split, rows), drop, is_apart))
     return found
 
 
@@ -149,17 +173,17 @@ class _Products:
                 own[i, f] += block.T @ block
         return cls(gram, cross, own)
 
-    def own_estimates(self, leading: int) -> Array:
-        """The effect's leading coefficients, estimated for every trajectory with a common model."""
-        p, n = self.gram.shape[1] - 1, len(self.own)
+    def own_estimates(self, leading: int, free: NDArray[np.bool_]) -> Array:
+        """The effect's leading coefficients, estimated for the free trajectories, each its own."""
+        p, n = self.gram.shape[1] - 1, int(free.sum())
         size = p + leading * n
         gram, right = np.zeros((size, size)), np.zeros(size)
-        whole, cross = self.gram.sum(0), self.cross.sum(1)[:, :, :leading]
+        whole, cross = self.gram.sum(0), self.cross[free].sum(1)[:, :, :leading]
         gram[:p, :p], right[:p] = whole[:p, :p], whole[:p, p]
         gram[:p, p:] = cross[:, :p].transpose(1, 0, 2).reshape(p, -1)
         gram[p:, :p] = gram[:p, p:].T
         right[p:] = cross[:, p].ravel()
-        for i, own in enumerate(self.own.sum(1)):
+        for i, own in enumerate(self.own[free].sum(1)):
             place = slice(p + leading * i, p + leading * (i + 1))
             gram[place, place] = own[:leading, :leading]
         scale = column_sizes(gram)

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 from scipy.stats import ttest_1samp
 
+from skidyn._cholesky import factored, solved
 from skidyn._signals import Array
 from skidyn.evidence import Problem
 
@@ -254,7 +254,6 @@ def ridge_solution(gram: Array, right: Array, ridge: float) -> Array:
     -------
     ndarray of shape (k,)
     """
-    normal, diagonal = gram.copy(), np.arange(len(gram))
+    normal, diagonal = gram.copy(order="F"), np.arange(len(gram))
     normal[diagonal, diagonal] += ridge
-    factor = cho_factor(normal, overwrite_a=True, check_finite=False)
-    return np.asarray(cho_solve(factor, right, check_finite=False))
+    return solved(factored(normal), right)

@@ -36,7 +36,8 @@ class Coulomb(Effect):
     """Dry friction of constant size against the motion.
 
     With ``rounding`` in its shape, in rad/s or m/s, it does not change sign at once, but as the
-    hyperbolic tangent of the velocity divided by this value.
+    hyperbolic tangent of the velocity divided by this value; with ``arctangent``, as its arctangent
+    divided by a right angle, which approaches the full size more slowly.
     """
 
     kind = "coulomb"
@@ -46,7 +47,7 @@ class Coulomb(Effect):
     formula = r"F_c\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("Fc", "N m", sign=1),)
     shapes = (Shape("rounding", "rad/s", (), 1e-3, 1.0, has_interval=False),)
-    forms = ({"rounding": 0.05},)
+    forms = ({"rounding": 0.05}, {"rounding": 0.05, "arctangent": 1.0})
     is_exact = True
     simplicity = 2
     rivals = ("stribeck", "dahl", "nonlinear_viscous")
@@ -55,7 +56,10 @@ class Coulomb(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         if "rounding" in shape:
-            return np.asarray(np.tanh(signals.dq[:, [joint]] / shape["rounding"]))
+            speed = signals.dq[:, [joint]] / shape["rounding"]
+            return np.asarray(
+                np.arctan(speed) / (np.pi / 2) if "arctangent" in shape else np.tanh(speed)
+            )
         return signals.sign[:, [joint]]
 
 
@@ -128,7 +132,7 @@ class NonlinearViscous(Effect):
     title = "Nonlinear viscous friction"
     formula = r"c\,|\dot q|^p\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("c", "N m (s/rad)^p"),)
-    shapes = (Shape("power", "1", (0.5, 2.0, 3.0), 0.15, 4.5, scales=False),)
+    shapes = (Shape("power", "1", (0.5, 2.0, 3.0), 0.15, 4.5, scales=False, limit_kind="coulomb"),)
     simplicity = 9
     rivals = ("viscous", "stribeck", "coulomb")
     separating_motion = "sweeps that reach the highest speed the joint allows"

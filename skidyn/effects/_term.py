@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -78,11 +78,19 @@ class Term:
         return tuple(joint - 1 for joint in self.joints)
 
     def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
         shape = self.shape.items()
         try:
             return hash((self.kind, self.joints, frozenset(shape)))
         except TypeError:  # a value that is a list
             return hash((self.kind, self.joints, frozenset(map(str, shape))))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # another process has other hashes
+        return {"kind": self.kind, "joints": self.joints, "shape": self.shape}
 
     def __str__(self) -> str:
         shape = "".join(f", {k}={_short(v)}" for k, v in self.shape.items())

@@ -13,12 +13,17 @@ from skidyn.effects._base import Array, Coefficient, Effect, Shape
 from skidyn.effects._springs import FEWEST_TOUCHING, MOST_TOUCHING
 
 
-def tool_position(signals: Signals) -> Array:
-    """Position of the tool, (n_samples, 3), computed once for all shapes."""
+def _tool_pose(signals: Signals) -> tuple[Array, Array]:
+    """Position and orientation of the tool, (n_samples, 3) and (n_samples, 3, 3), computed once."""
     robot = signals.robot
     assert robot is not None
-    position: Array = signals.once("tool", lambda: robot.forward_kinematics(signals.q)[0])
-    return position
+    pose: tuple[Array, Array] = signals.once("tool", lambda: robot.forward_kinematics(signals.q))
+    return pose
+
+
+def tool_position(signals: Signals) -> Array:
+    """Position of the tool, (n_samples, 3), computed once for all shapes."""
+    return _tool_pose(signals)[0]
 
 
 def tool_jacobian(signals: Signals) -> Array:
@@ -41,6 +46,8 @@ def _turning_jacobian(signals: Signals) -> Array:
     return jacobian
 
 
+#: Change of a direction of the tool below which the frames of tool and base are the same.
+_LEAST_TURN = 0.05
 #: Distance of a centre of mass from its link, in m, beyond which the mass is not determined.
 FARTHEST = 5.0
 
@@ -118,7 +125,9 @@ class Payload(_ToolEffect):
 class ExternalWrench(_ToolEffect):
     """A constant force on the tool: a hose, a spring balancer, a hand that pulls.
 
-    If it does not act at the origin of the tool, its moment about the origin is constant, too.
+    If it does not act at the origin of the tool, its moment about the origin is constant, too. Its
+    direction is that in the frame of the base, or, with ``on_tool``, that in the frame of the tool,
+    as of a jet or a propeller.
     """
 
     kind = "external_wrench"
@@ -129,6 +138,7 @@ class ExternalWrench(_ToolEffect):
         *(Coefficient(f"f{axis}", "N") for axis in "xyz"),
         *(Coefficient(f"m{axis}", "N m") for axis in "xyz"),
     )
+    forms = ({"on_tool": 1.0},)
     # One trajectory determines a force, and a moment only if it turns the tool about all axes.
     leading = 3
     simplicity = 28
@@ -139,17 +149,33 @@ class ExternalWrench(_ToolEffect):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        moving, turning = tool_jacobian(signals), _turning_jacobian(signals)
-        return {j: -np.hstack([moving[:, :, j], turning[:, :, j]]) for j in joints}
+        parts = [tool_jacobian(signals), _turning_jacobian(signals)]
+        if "on_tool" in shape:
+            orientation = _tool_pose(signals)[1]
+            parts = [np.einsum("iab,iaj->ibj", orientation, part) for part in parts]
+        return {j: -np.hstack([part[:, :, j] for part in parts]) for j in joints}
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        orientation = _tool_pose(signals)[1]
+        turns = np.ptp(orientation, axis=0).max(initial=0.0) > _LEAST_TURN
+        return super().grid(signals, joints) if turns else [{}]
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
-        names = [f"{what}_{axis}" for what in ("force", "moment") for axis in "xyz"]
+        frame = "tool_" if "on_tool" in shape else ""
+        names = [f"{frame}{what}_{axis}" for what in ("force", "moment") for axis in "xyz"]
         return dict(zip(names, map(float, coefficients), strict=True))
 
+    def meaning(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
+        if "tool_force_x" not in parameters:
+            return ""
+        return "The force turns with the tool: its components are along the axes of the last link."
+
     def units(self, prismatic: bool = False) -> dict[str, str]:
-        return {f"force_{a}": "N" for a in "xyz"} | {f"moment_{a}": "N m" for a in "xyz"}
+        frames = ("", "tool_")
+        force = {f"{frame}force_{a}": "N" for frame in frames for a in "xyz"}
+        return force | {f"{frame}moment_{a}": "N m" for frame in frames for a in "xyz"}
 
 
 #: Power of the depth with which the force between round bodies grows (Hertz 1882).

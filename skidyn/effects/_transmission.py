@@ -208,8 +208,9 @@ class _LinkSideEffect(Effect):
         moves = self.moves(signals, joint, **shape)
         slopes = [_slope(signals, joint, by) for by in ("position", "velocity", "acceleration")]
         change = np.zeros((signals.n_joints, signals.n_samples))
+        product = np.empty_like(change)
         for slope, move in zip(slopes, moves, strict=True):
-            change -= slope * move
+            change -= np.multiply(slope, move, out=product)
         return {j: own[:, None] for j, own in enumerate(change)}
 
 
@@ -368,12 +369,12 @@ def _flight(acceleration: Array, step: float, half: float, chunk: int = 64) -> A
     position = np.empty(n)
     side = 1.0 if acceleration[0] >= 0 else -1.0
     changes = np.flatnonzero(np.diff(np.sign(acceleration))) + 1
+    away = {s: np.append(changes[acceleration[changes] * s < 0], n) for s in (1.0, -1.0)}
     k = 0
     while k < n:
         # On a flank until the acceleration points away from it.
-        later = changes[np.searchsorted(changes, k) :]
-        leaving = later[acceleration[later] * side < 0]
-        start = k if acceleration[k] * side < 0 else (int(leaving[0]) if len(leaving) else n)
+        leaving = away[side]
+        start = k if acceleration[k] * side < 0 else int(leaving[np.searchsorted(leaving, k)])
         position[k:start] = side * half
         k, x, v = start, side * half, 0.0
         while k < n:

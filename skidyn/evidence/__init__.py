@@ -19,6 +19,11 @@ from skidyn.evidence._felt import (
     gram_of as gram_of,
     products_with as products_with,
 )
+from skidyn.evidence._fit import (
+    Fit as Fit,
+    own_noise as own_noise,
+    weighted_least_squares as weighted_least_squares,
+)
 from skidyn.evidence._folds import (
     RIDGE as RIDGE,
     Normal as Normal,
@@ -40,24 +45,25 @@ from skidyn.evidence._from_motion import (
     sample_blocks as sample_blocks,
 )
 from skidyn.evidence._kinematics import smooth_motion as smooth_motion
+from skidyn.evidence._motion_rows import (
+    SHORT_MARGIN as SHORT_MARGIN,
+    read_motion as read_motion,
+)
 from skidyn.evidence._parquet import (
     ColumnMap as ColumnMap,
     read_trajectories as read_trajectories,
     trajectory_lengths as trajectory_lengths,
 )
 from skidyn.evidence._problem import (
-    SHORT_MARGIN as SHORT_MARGIN,
-    Fit as Fit,
     Problem as Problem,
     hysteresis_joints as hysteresis_joints,
-    independent_columns as independent_columns,
     make_problem as make_problem,
-    own_noise as own_noise,
-    read_motion as read_motion,
-    regressor_rows as regressor_rows,
-    weighted_least_squares as weighted_least_squares,
     with_reversals as with_reversals,
     with_short_windows as with_short_windows,
+)
+from skidyn.evidence._rigid_rows import (
+    independent_columns as independent_columns,
+    regressor_rows as regressor_rows,
 )
 from skidyn.evidence._rows import (
     FEWEST_SAMPLES as FEWEST_SAMPLES,

@@ -95,7 +95,7 @@ def gram_of(felt: Sequence[Felt], width: int) -> Array:
     """Products of all columns of a model, summed over the joints, shape (width, width)."""
     gram = np.zeros((width, width))
     for own in felt:
-        gram[np.ix_(own.places, own.places)] += own.rows.T @ own.rows
+        gram[own.places[:, None], own.places] += own.rows.T @ own.rows
     return gram
 
 

@@ -12,8 +12,8 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
+from skidyn._cholesky import factored, solved
 from skidyn._signals import Array, Signals
 
 #: Diagonal added to normalised normal equations, far below any information in the data.
@@ -54,13 +54,13 @@ class Normal:
     def __init__(self, gram: Array, right: Array, scale: Array, ridge: float = RIDGE) -> None:
         self._scale = scale
         normal = gram / scale[:, None] / scale + ridge * np.eye(len(scale))
-        self._factor = cho_factor(normal, check_finite=False)
+        self._factor = factored(normal)
         self.solution = self.solve(right)
 
     def solve(self, right: Array) -> Array:
         """Solution for other right sides, shape (p,) or (p, k)."""
         scale = self._scale if right.ndim == 1 else self._scale[:, None]
-        return np.asarray(cho_solve(self._factor, right / scale, check_finite=False)) / scale
+        return solved(self._factor, right / scale) / scale
 
 
 def column_sizes(gram: Array) -> Array:

@@ -15,7 +15,7 @@ from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term
 from skidyn.evidence._evidence import Evidence, Key
-from skidyn.evidence._problem import FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS
+from skidyn.evidence._motion_rows import FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS
 from skidyn.evidence._streaming import linear_terms
 from skidyn.robots import BaseParameters, Robot, find_base_parameters
 

@@ -11,69 +11,21 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import qr
 from scipy.sparse import csr_matrix
 
 from skidyn._cores import each
 from skidyn._progress import tell
 from skidyn._signals import Array, Signals
-from skidyn.effects import Term, TermSum
-from skidyn.evidence._broken import without_broken
-from skidyn.evidence._folds import RIDGE, Normal, nearest_folds
-from skidyn.evidence._kinematics import smooth_motion
-from skidyn.evidence._rows import (
-    FEWEST_SAMPLES,
-    WINDOW,
-    Rows,
-    RowsInTime,
-    averaged,
-    column_step,
-    every_sample,
-    interpolation,
-    sliding_samples,
-    window_rows,
-)
-from skidyn.robots import Robot, base_parameter_index, with_whole_turns
+from skidyn.effects import Term, TermSum, get_effect
+from skidyn.evidence._fit import Fit, FittedAlone, fit_weighted
+from skidyn.evidence._folds import nearest_folds
+from skidyn.evidence._motion_rows import RowsAndFolds, read_motion, rows_and_folds
+from skidyn.evidence._rigid_rows import independent_columns, regressor_rows
+from skidyn.evidence._rows import WINDOW, Rows, averaged, interpolation
+from skidyn.robots import Robot, base_parameter_index
 
-#: Columns of the rigid body weaker than this (relative, after pivoting) are dependent on others.
-RANK_TOLERANCE = 2e-6
-#: Folds are whole trajectories if there are more than this many, else blocks of them.
-FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS = 6, 8, 20
-#: Combinations of columns smaller than the root of this, relative to their parts, may be
-#: undetermined.
-LARGEST_RIDGE = 1e-6
 #: Samples per window that are enough for a smooth function; at first, others are omitted.
 ENOUGH_SAMPLES = 16
-#: Share of the smoother's half width that is left out around rest and reversals, and number of
-#: samples left out where a model of hysteresis describes the motion between the two.
-MARGIN, SHORT_MARGIN = 0.75, 1
-
-
-@dataclass(frozen=True)
-class Fit:
-    """A weighted least-squares fit of the model with some terms.
-
-    Attributes
-    ----------
-    terms : TermSum
-        Terms beside the rigid body, in the order of the coefficients.
-    coefficients : ndarray of shape (n_coefficients,)
-        First the rigid body's independent parameters, then those of the terms.
-    residual : list of ndarray of shape (n_rows_j,)
-        Residual of the averaged rows of every joint, N m or N.
-    sigma : ndarray of shape (n_joints,)
-        Noise of one row of every joint, by which the rows were weighted.
-    """
-
-    terms: TermSum
-    coefficients: Array
-    residual: list[Array]
-    sigma: Array
-
-    @property
-    def noise(self) -> Array:
-        """Root mean square of the residual rows of every joint."""
-        return np.array([np.sqrt(np.mean(r**2)) + 1e-100 if len(r) else 1.0 for r in self.residual])
 
 
 @dataclass
@@ -135,9 +87,10 @@ class Problem:
 
     def term_rows(self, term: Term) -> dict[int, Array]:
         """Averaged columns of a term, per joint on which it acts."""
-        if term not in self._cache:
-            self._cache[term] = self._averaged(term, self._step(term))
-        return self._cache[term]
+        rows = self._cache.get(term)
+        if rows is None:
+            rows = self._cache[term] = self._averaged(term, self._step(term))
+        return rows
 
     def screening_rows(self, term: Term) -> dict[int, Array]:
         """As :meth:`term_rows`, but of an unknown function from only as many samples as needed.
@@ -261,10 +214,10 @@ class Problem:
         if sigma is None:
             alone = self._fitted_alone(blocks, target, design)
             sigma = np.array([own.noise(len(y)) for own, y in zip(alone, target, strict=True)])
-        fit = _weighted(terms, design, target, sigma)
+        fit = fit_weighted(terms, design, target, sigma)
         for k in range(1, passes):
             tell("Fitting", k / passes)
-            fit = _weighted(terms, design, target, fit.noise)
+            fit = fit_weighted(terms, design, target, fit.noise)
         return fit
 
     def own_noise(self, terms: Iterable[Term]) -> Array:
@@ -404,7 +357,8 @@ class Problem:
             smooth_torque=lambda: torques()[1],
             inertial_parameters=self.inertial_parameters(fit),
         )
-        self._cache = {t: rows for t, rows in self._cache.items() if not t.effect.follows_fit}
+        following = {k for k in {t.kind for t in self._cache} if get_effect(k).follows_fit}
+        self._cache = {t: rows for t, rows in self._cache.items() if t.kind not in following}
 
 
 class _Torques:
@@ -483,7 +437,7 @@ def make_problem(
     motion = read_motion(signals, smooth, torque)
     if weight is not None:
         motion = motion.with_(valid=motion.usable & (weight > 0)[:, None])
-    rows, fold, n_folds, whole = _rows_and_folds(motion, reversals, weight)
+    rows, fold, n_folds, whole = rows_and_folds(motion, reversals, weight)
     problem = Problem(
         robot,
         motion.with_(robot=robot),
@@ -517,7 +471,7 @@ def with_reversals(problem: Problem, terms: Iterable[Term], joints: Sequence[int
     joints : sequence of int
         Joints, from 0, whose rows reach up to the reversals.
     """
-    return _with_rows(problem, terms, _rows_and_folds(problem.signals, joints))
+    return _with_rows(problem, terms, rows_and_folds(problem.signals, joints))
 
 
 def with_short_windows(problem: Problem, terms: Iterable[Term], window: float) -> Problem:
@@ -532,11 +486,11 @@ def with_short_windows(problem: Problem, terms: Iterable[Term], window: float) -
     window : float, s
         Width of the windows.
     """
-    return _with_rows(problem, terms, _rows_and_folds(problem.signals, (), window=window))
+    return _with_rows(problem, terms, rows_and_folds(problem.signals, (), window=window))
 
 
-def _with_rows(problem: Problem, terms: Iterable[Term], rows_and_folds: _RowsAndFolds) -> Problem:
-    rows, fold, n_folds, whole = rows_and_folds
+def _with_rows(problem: Problem, terms: Iterable[Term], made: RowsAndFolds) -> Problem:
+    rows, fold, n_folds, whole = made
     other = replace(
         problem,
         terms=TermSum(terms),
@@ -554,66 +508,6 @@ def _with_rows(problem: Problem, terms: Iterable[Term], rows_and_folds: _RowsAnd
     return other
 
 
-def read_motion(signals: Signals, smooth: bool, torque: Array) -> Signals:
-    """Motion as used by the rows, smoothed or as logged, without broken samples."""
-    if signals.time is None:
-        return signals
-    motion = without_broken(smooth_motion(signals), signals, torque)
-    return motion if smooth else motion.with_(q=signals.q, dq=signals.dq, ddq=signals.ddq)
-
-
-def motion_rows(signals: Signals, reversals: Sequence[int], window: float = WINDOW) -> Rows:
-    """Averaging windows over the samples that count."""
-    if signals.time is None:
-        return every_sample(signals)
-    margin = np.full(signals.n_joints, max(1, round(MARGIN * signals.half_width)))
-    margin[list(reversals)] = SHORT_MARGIN
-    use = sliding_samples(signals, signals.usable, margin.tolist())
-    step = column_step(signals, window, int(margin.min()))
-    rows = window_rows(signals, use, window, step)
-    few = rows.counts < FEWEST_ROWS
-    if not (few & (rows.counts > 0)).any():
-        return rows
-    use = use & ~few  # a joint that slides for a moment only is treated as one at rest
-    return window_rows(signals, use, window, step)
-
-
-#: Rows of a joint at least: fewer are fitted by its own friction and inertia, whatever else acts.
-FEWEST_ROWS = 12
-
-_RowsAndFolds = tuple[Rows, list[NDArray[np.int64]], int, bool]
-
-
-def _rows_and_folds(
-    signals: Signals,
-    reversals: Sequence[int],
-    weight: Array | None = None,
-    window: float = WINDOW,
-) -> _RowsAndFolds:
-    """Averaging windows and the folds they fall into."""
-    # A slow log has wider windows, which extend further over a border; single samples do not.
-    clock = signals.time is not None
-    guard = max(WINDOW_GUARD, _half_window(signals.rate)) if clock else 0.0
-    rows = motion_rows(signals, reversals, window)
-    return _folds(rows if weight is None else rows.weighted(weight), guard)
-
-
-def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> list[Array]:
-    """Averaged columns of the torque regressor, chunk by chunk; only the given ones if any."""
-    assert problem.robot is not None
-    robot = with_whole_turns(problem.robot)
-    index = np.arange(10 * robot.n_bodies) if index is None else index
-    rows = [np.zeros((count, len(index))) for count in problem.rows.counts]
-    s, weights = problem.sampled(problem.rows.step)
-    in_time = [RowsInTime.of(own) for own in weights]
-    for chunk, regressor in robot.iter_torque_regressor(s.q, s.dq, s.ddq):
-        for j, block in enumerate(rows):
-            here, shares = in_time[j].within(chunk)
-            block[here] += shares @ regressor[j][index].T
-        tell("Computing the rigid body", chunk.stop / len(s.q))
-    return rows
-
-
 def _add_rigid_body(problem: Problem) -> None:
     """Average the torque regressor and keep its independent columns."""
     assert problem.robot is not None
@@ -626,143 +520,3 @@ def _add_rigid_body(problem: Problem) -> None:
         if len(shown) == len(base)
         else [np.ascontiguousarray(block[:, shown]) for block in rows]
     )
-
-
-def independent_columns(rows: Array) -> NDArray[np.int64]:
-    """Columns of base parameters that the data determines, by QR with pivoting; sorted.
-
-    The triangular factor of the rows gives the same answer as the rows themselves.
-    """
-    size = np.linalg.norm(rows, axis=0)
-    moved = np.flatnonzero(size > 1e-9 * max(size.max(initial=0.0), 1e-300))
-    if not len(moved):
-        return moved
-    scaled = np.empty((len(rows), len(moved)), order="F")  # in the order of LAPACK: no copy
-    for k, column in enumerate(moved):
-        np.divide(rows[:, column], size[column], out=scaled[:, k])
-    triangle, pivots = qr(scaled, overwrite_a=True, mode="r", pivoting=True)
-    diagonal = np.abs(np.diag(triangle))
-    rank = int(np.sum(diagonal > RANK_TOLERANCE * diagonal[0]))
-    return np.sort(moved[pivots[:rank]])
-
-
-def _half_window(rate: float) -> float:
-    return FEWEST_SAMPLES / rate / 2
-
-
-def _folds(rows: Rows, guard: float) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
-    """Assign rows to folds and sort them; blocks of few trajectories lose the rows at borders."""
-    names = np.unique(np.concatenate(rows.trajectory))
-    whole = len(names) > FEW_TRAJECTORIES
-    blocks = 1 if whole else max(2, -(-FEWEST_BLOCKS // max(1, len(names))))
-    ends = {}
-    for name in names:
-        times = np.concatenate(
-            [t[k == name] for t, k in zip(rows.time, rows.trajectory, strict=True)]
-        )
-        ends[name] = np.linspace(times.min(), times.max() + 1e-9, blocks + 1)
-    n_folds = min(len(names) * blocks, MOST_FOLDS) if whole else len(names) * blocks
-    fold, order = [], []
-    for time, trajectory in zip(rows.time, rows.trajectory, strict=True):
-        label = np.searchsorted(names, trajectory) * blocks
-        keep = np.ones(len(time), dtype=bool)
-        for name in names:
-            inside = np.flatnonzero(trajectory == name)
-            edges = ends[name][1:-1]
-            label[inside] += np.searchsorted(edges, time[inside], side="right")
-            for edge in edges:
-                near = np.abs(time[inside] - edge) < guard
-                keep[inside[near]] = False
-        label = label * n_folds // (len(names) * blocks)
-        index = np.flatnonzero(keep)
-        index = index[np.argsort(label[index], kind="stable")]
-        fold.append(label[index])
-        order.append(index)
-    return rows.taken(order), fold, n_folds, whole
-
-
-#: Rows whose middle is nearer than this, or half a window, to the border between two blocks are
-#: dropped, in s.
-WINDOW_GUARD = 1 / 16
-
-
-#: Directions weaker than this, relative to the strongest one, are due to rounding.
-RANK = 1e-7
-
-
-#: Rows for each direction of the columns of a joint from which its residual determines its noise.
-ROWS_A_DIRECTION = 2.0
-
-
-@dataclass(frozen=True)
-class FittedAlone:
-    """Residual of a joint fitted by itself, so that errors of other joints have no influence.
-
-    Attributes
-    ----------
-    left, whole : float
-        Squared residual and squared torque.
-    rank : int
-        Number of directions of the columns that the rows determine.
-    """
-
-    left: float
-    whole: float
-    rank: int
-
-    @classmethod
-    def of(cls, design: Array, target: Array) -> FittedAlone:
-        """Fit rows, or their triangular factor."""
-        if not len(target):
-            return cls(0.0, 0.0, 0)
-        size = np.linalg.norm(design, axis=0)
-        used = size > 0
-        scaled = design[:, used] / size[used]
-        solution, _, rank, _ = np.linalg.lstsq(scaled, target, rcond=RANK)
-        left, whole = np.sum((target - scaled @ solution) ** 2), np.sum(target**2)
-        return cls(float(left), float(whole), int(rank))
-
-    def noise(self, count: float, rows: float | None = None) -> float:
-        """Root of the squared residual divided by ``count``.
-
-        ``rows``, by default the same, is the number of rows that were fitted. With too few rows to
-        determine the noise, the torque itself is its bound; without any, the noise is 1.
-        """
-        if not count:
-            return 1.0
-        rows = count if rows is None else rows
-        left = self.left
-        if rows <= ROWS_A_DIRECTION * self.rank:
-            left = self.whole  # of a joint that hardly slides: a few rows are fitted by anything
-        return float(np.sqrt(max(left, RANK**2 * self.whole) / count)) or 1.0
-
-
-def own_noise(design: Array, target: Array, count: float, rows: float | None = None) -> float:
-    """Noise of a joint fitted alone (:meth:`FittedAlone.noise`)."""
-    return FittedAlone.of(design, target).noise(count, rows)
-
-
-def weighted_least_squares(design: list[Array], target: list[Array], sigma: Array) -> Array:
-    """Coefficients of least squares with joints weighted by their noise."""
-    return _weighted(TermSum(), design, target, sigma).coefficients
-
-
-def _weighted(terms: TermSum, design: list[Array], target: list[Array], sigma: Array) -> Fit:
-    a = np.empty((sum(map(len, design)), design[0].shape[1]))
-    ends = np.cumsum([0, *map(len, design)])
-    for block, s, start, stop in zip(design, sigma, ends[:-1], ends[1:], strict=True):
-        np.divide(block, s, out=a[start:stop])
-    y = np.concatenate([t / s for t, s in zip(target, sigma, strict=True)])
-    size = np.linalg.norm(a, axis=0)
-    size[size == 0] = 1.0
-    unit = a / size
-    # No single column explains more than the whole torque. Undetermined quantities, such as the
-    # share of a rotor in an inertia, are set by the smallest corrections, so that the loads of the
-    # joints, which depend on them, stay realistic.
-    ridge = max(RIDGE, 1 / max(float(y @ y), 1 / LARGEST_RIDGE))
-    normal = Normal(unit.T @ unit, unit.T @ y, np.ones(len(size)), ridge)
-    # One refinement step recovers the accuracy lost by forming the Gram matrix.
-    scaled = normal.solution + normal.solve(unit.T @ (y - a @ (normal.solution / size)))
-    coefficients = scaled / size
-    residual = [t - block @ coefficients for block, t in zip(design, target, strict=True)]
-    return Fit(terms, coefficients, residual, np.asarray(sigma, dtype=float))

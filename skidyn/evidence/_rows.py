@@ -103,6 +103,27 @@ class Rows:
         steps = np.concatenate([np.diff(t) for t in self.time if len(t) > 1] or [np.ones(1)])
         return float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
 
+    def in_time(self, joint: int) -> NDArray[np.intp]:
+        """Rows of a joint by trajectory and time."""
+        if joint not in self._sorted:
+            self._sorted[joint] = np.lexsort((self.time[joint], self.trajectory[joint]))
+        return self._sorted[joint]
+
+    def earlier(self, joint: int, lag: int) -> NDArray[np.intp]:
+        """Places in :meth:`in_time` of which that ``lag`` later is in the same trajectory."""
+        if (joint, lag) not in self._earlier:
+            name = self.trajectory[joint][self.in_time(joint)]
+            self._earlier[joint, lag] = np.flatnonzero(name[:-lag] == name[lag:])
+        return self._earlier[joint, lag]
+
+    @cached_property
+    def _sorted(self) -> dict[int, NDArray[np.intp]]:
+        return {}
+
+    @cached_property
+    def _earlier(self) -> dict[tuple[int, int], NDArray[np.intp]]:
+        return {}
+
     def average(self, values: Array, joint: int) -> Array:
         """Rows of a joint from values at every sample, shape (n_samples,) or (n_samples, k)."""
         return averaged(self.weights[joint], values)

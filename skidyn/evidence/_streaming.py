@@ -17,8 +17,9 @@ from skidyn._exceptions import LogError, SkidynError
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, TermSum, make_terms
 from skidyn.evidence._evidence import Evidence, column_names
+from skidyn.evidence._motion_rows import motion_rows, read_motion
 from skidyn.evidence._parquet import ColumnMap, read_trajectories
-from skidyn.evidence._problem import Problem, hysteresis_joints, motion_rows, read_motion
+from skidyn.evidence._problem import Problem, hysteresis_joints
 from skidyn.robots import Robot, base_parameter_index
 
 PathLike = str | os.PathLike[str]

@@ -252,8 +252,8 @@ class TorqueScale(Check):
                 )
         if beyond:
             names = ", ".join(measurement.joint(k) for k in beyond)
-            times = ", ".join(f"{size:.3g}" for size in beyond.values())
-            evidence.append(f"it reaches {times} times the effort limit of {names}")
+            sizes = ", ".join(f"{size:.3g}" for size in beyond.values())
+            evidence.append(f"it reaches {sizes} times the effort limit of {names}")
         if found or beyond:
             units = {k: unit for k, gain in found.items() if (unit := _unit_like(gain))}
             units |= dict.fromkeys(beyond, KILO)

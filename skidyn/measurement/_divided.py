@@ -358,10 +358,9 @@ def _likelihoods(
                 for g in groups
             ]
         )
-        count = (len(groups), 1)
-        after = [
-            fit.likelihood for fit in fit_at_once(columns, np.tile(y, count), np.tile(use, count))
-        ]
+        shape = len(groups), len(y)
+        fitted = fit_at_once(columns, np.broadcast_to(y, shape), np.broadcast_to(use, shape))
+        after = [fit.likelihood for fit in fitted]
         total += (np.array(after) - before) / known.inflation_of(k)
     return total
 

@@ -136,13 +136,13 @@ def test_lines_fit_a_narrow_terminal_and_colours_can_be_off(short):
     assert "Stribeck friction on joint 2" in text
 
 
-def test_a_program_gets_json_alone_and_nothing_beside(short):
-    words = [sys.executable, "-m", "skidyn", "compare", *short, "--json"]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
+def test_a_program_gets_json_alone_and_nothing_beside(short, capfd):
+    assert cli.main(["compare", *short, "--json"]) == cli.DONE
 
-    assert json.loads(done.stdout)["table"]
-    assert "\x1b" not in done.stdout + done.stderr
-    assert all(line.startswith("warning: ") for line in done.stderr.splitlines())
+    out, errors = capfd.readouterr()
+    assert json.loads(out)["table"]
+    assert "\x1b" not in out + errors
+    assert all(line.startswith("warning: ") for line in errors.splitlines())
 
 
 def test_help_keeps_examples_that_can_be_copied(monkeypatch, capsys):

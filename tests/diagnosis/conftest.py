@@ -4,6 +4,7 @@
 import warnings
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
@@ -60,6 +61,22 @@ def nameless(request):
         formula=formula,
         size=log.parameters[size],
     )
+
+
+@pytest.fixture(scope="module")
+def diagnosed_once():
+    """EffectSearchCV diagnoses each log once, since what follows a diagnosis is tested."""
+    made = {}
+
+    def once(model, X, y, **options):
+        key = (repr(model), np.asarray(X).tobytes(), y.tobytes(), repr(options))
+        if key not in made:
+            made[key] = diagnose(model, X, y, **options)
+        return made[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("skidyn.diagnosis._effect_search.diagnose", once)
+        yield
 
 
 @pytest.fixture(scope="session")

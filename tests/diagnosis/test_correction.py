@@ -30,8 +30,18 @@ def kinds(diagnosis):
     return [(f.kind, f.joints) for f in diagnosis.findings]
 
 
-def test_a_corrected_model_refits():
-    diagnosis = diagnose(Ridge().fit(LOG.X, LOG.y), LOG.X, LOG.y, robot=LOG.robot, effects=KINDS)
+def diagnosed(model, X=LOG.X, **options):
+    """The log is as it should be: no test looks at its checks."""
+    return diagnose(model, X, LOG.y, robot=LOG.robot, effects=KINDS, checks=(), **options)
+
+
+@pytest.fixture(scope="module")
+def of_ridge():
+    return diagnosed(Ridge().fit(LOG.X, LOG.y))
+
+
+def test_a_corrected_model_refits(of_ridge):
+    diagnosis = of_ridge
     model = diagnosis.model if diagnosis.findings else diagnosis.add("spring", [2])
     again = clone(model).fit(LOG.X, LOG.y)
     np.testing.assert_allclose(again.predict(LOG.X), model.predict(LOG.X), atol=1e-6)
@@ -48,7 +58,7 @@ def test_a_corrected_model_refits():
     ids=["search", "target", "pipeline"],
 )
 def test_models_inside_others_are_opened(model):
-    diagnosis = diagnose(model.fit(LOG.X, LOG.y), LOG.X, LOG.y, effects=KINDS)
+    diagnosis = diagnosed(model.fit(LOG.X, LOG.y))
     assert kinds(diagnosis) == [("spring", (2,))]
     expected = Pipeline if isinstance(model, Pipeline) else RBDRegressor
     assert isinstance(diagnosis.model, expected)
@@ -71,7 +81,7 @@ def test_models_inside_others_are_opened(model):
 def test_effects_found_on_a_pipeline_return_a_pipeline(steps, before):
     X = LOG.X if not before else LOG.X.filter(regex=r"^(trajectory|time|q\d)")
     given = make_pipeline(*steps).fit(X, LOG.y)
-    diagnosis = diagnose(given, X, LOG.y, robot=LOG.robot, effects=KINDS)
+    diagnosis = diagnosed(given, X)
     for model in (diagnosis.model, diagnosis.add("spring", [2])):
         assert isinstance(model, Pipeline)
         assert [name for name, _ in model.steps] == [*before, "ridge"]
@@ -94,7 +104,7 @@ def test_effects_found_on_a_pipeline_return_a_pipeline(steps, before):
 def test_weights_reach_the_steps_of_a_corrected_pipeline(tmp_path):
     weight = np.linspace(0.5, 1.5, len(LOG.X))
     given = make_pipeline(DropKeys(), Ridge()).fit(LOG.X, LOG.y)
-    diagnosis = diagnose(given, LOG.X, LOG.y, robot=LOG.robot, sample_weight=weight, effects=KINDS)
+    diagnosis = diagnosed(given, sample_weight=weight)
     assert diagnosis.findings
     model = clone(diagnosis.model).fit(LOG.X, LOG.y, ridge__sample_weight=weight)
     own = make_pipeline(DropKeys(), Ridge()).fit(LOG.X, LOG.y, ridge__sample_weight=weight)
@@ -117,11 +127,9 @@ def test_weights_reach_the_steps_of_a_corrected_pipeline(tmp_path):
     assert np.isfinite(scores).all()
 
 
-def test_a_corrected_model_is_diagnosed_with_its_effects():
-    given = Ridge().fit(LOG.X, LOG.y)
-    first = diagnose(given, LOG.X, LOG.y, robot=LOG.robot, effects=KINDS)
-    corrected = first.add("spring", [2])
-    again = diagnose(corrected, LOG.X, LOG.y, effects=KINDS)
+def test_a_corrected_model_is_diagnosed_with_its_effects(of_ridge):
+    corrected = of_ridge.add("spring", [2])
+    again = diagnosed(corrected)
     left = np.sqrt(np.mean((corrected.predict(LOG.X) - LOG.y) ** 2, axis=0))
     assert np.all(again.rmse_before < 1.5 * left)
     assert [t.kind for t in again.add("spring", [1]).effect_terms_] == ["spring", "spring"]
@@ -166,9 +174,9 @@ def test_a_search_of_effects_stands_inside_other_searches():
 def test_steps_without_a_state_learn_the_names_of_their_columns():
     step = FunctionTransformer(feature_names_out="one-to-one")
     pipeline = make_pipeline(step, RBDRegressor(LOG.robot))
-    found = diagnose(pipeline, LOG.X, LOG.y, effects=KINDS)
+    found = diagnosed(pipeline)
     assert isinstance(found.model, Pipeline)
-    expected = diagnose(RBDRegressor(LOG.robot), LOG.X, LOG.y, effects=KINDS)
+    expected = diagnosed(RBDRegressor(LOG.robot))
     np.testing.assert_allclose(found.model.predict(LOG.X), expected.model.predict(LOG.X))
 
 
@@ -185,7 +193,7 @@ def test_names_for_a_model_that_is_not_physics_are_said_to_be_of_the_model():
         def predict(self, X):
             return self.bodies_.predict(X)
 
-    diagnosis = diagnose(Bodies().fit(X, y), X, y, robot=LOG.robot, effects=KINDS)
+    diagnosis = diagnosed(Bodies().fit(X, y))
 
     assert any("not a rigid-body model" in note for note in diagnosis.warnings)
     (finding,) = diagnosis.findings

@@ -202,7 +202,7 @@ def test_an_error_of_units_is_said_with_its_evidence(log):
 
 def test_no_physics_is_named_while_a_unit_is_in_doubt():
     arm = load_planar_arm()
-    log = make_hidden_effect_log(arm, "spring", n_trajectories=8, duration=6.0, random_state=3)
+    log = make_hidden_effect_log(arm, "spring", n_trajectories=6, duration=4.0, random_state=3)
     X = log.X.assign(time=1.5 * log.X["time"])  # the clock, or velocities at another scale
 
     told = (

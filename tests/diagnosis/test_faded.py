@@ -14,6 +14,7 @@ from skidyn.diagnosis import EffectSearchCV
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
+pytestmark = pytest.mark.usefixtures("diagnosed_once")
 PENDULUM = Robot.from_urdf(
     '<robot name="pendulum"><link name="base"/><link name="rod"><inertial>'
     '<origin xyz="0.2 0 0"/><mass value="1.5"/>'
@@ -47,7 +48,7 @@ def error(model):
 
 
 @pytest.fixture(scope="module")
-def search():
+def search(diagnosed_once):
     return clone(SEARCH).fit(X, Y)
 
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,17 @@ PART = (2, 5, 6, 9)
 @pytest.fixture(scope="module")
 def log():
     return make_hidden_effect_log(load_planar_arm(), None, noise="low", random_state=21)
+
+
+@pytest.fixture(scope="module")
+def diagnosed(log):
+    """Diagnosis of the log with a torque, by its function, in some of the recordings; once each."""
+
+    @cache
+    def of(torque, recordings):
+        return diagnose(RBDRegressor(log.robot), log.X, added(log, torque(log), recordings))
+
+    return of
 
 
 def added(log, torque, trajectories):
@@ -42,10 +55,8 @@ def falling(log):
 @pytest.mark.parametrize(
     ("torque", "kinds"), [(rising, {"end_stop", "nonlinear_spring"}), (falling, {"stribeck"})]
 )
-def test_is_named_with_its_recordings(log, torque, kinds):
-    diagnosis = diagnose(RBDRegressor(log.robot), log.X, added(log, torque(log), PART))
-
-    (finding,) = diagnosis.findings
+def test_is_named_with_its_recordings(diagnosed, torque, kinds):
+    (finding,) = diagnosed(torque, PART).findings
     assert finding.kind in kinds
     assert finding.joints == (2,)
     assert set(finding.trajectories) <= set(PART)
@@ -53,9 +64,8 @@ def test_is_named_with_its_recordings(log, torque, kinds):
     assert "in trajectories 2, 5" in finding.sentence
 
 
-def test_is_predicted_for_these_recordings_only(log):
-    y = added(log, rising(log), PART)
-    diagnosis = diagnose(RBDRegressor(log.robot), log.X, y)
+def test_is_predicted_for_these_recordings_only(log, diagnosed):
+    diagnosis = diagnosed(rising, PART)
 
     truth = RBDRegressor(log.robot).fit(log.X, log.y).predict(log.X)[:, 1]
     inside = np.isin(log.X["trajectory"].to_numpy(), diagnosis.findings[0].trajectories)
@@ -63,11 +73,10 @@ def test_is_predicted_for_these_recordings_only(log):
     assert np.std(error) < 0.1 * np.std(rising(log)[inside])
 
 
-def test_an_effect_of_all_recordings_has_no_part(log):
-    everywhere = np.unique(log.X["trajectory"])
-    diagnosis = diagnose(RBDRegressor(log.robot), log.X, added(log, rising(log), everywhere))
+def test_an_effect_of_all_recordings_has_no_part(log, diagnosed):
+    everywhere = tuple(np.unique(log.X["trajectory"]))
 
-    assert all(f.trajectories is None for f in diagnosis.findings)
+    assert all(f.trajectories is None for f in diagnosed(rising, everywhere).findings)
 
 
 def test_elastic_joints_and_inertias_are_not_tried_in_a_part(log):

@@ -2,6 +2,7 @@
 """Loads that some recordings have."""
 
 import numpy as np
+import pytest
 
 from skidyn.datasets import load_panda, load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import Settings, diagnose, split_effects
@@ -21,18 +22,50 @@ def test_the_recordings_with_a_payload_are_told_from_the_others():
     assert (split.drop > 0).all()  # in every quarter of the recordings
 
 
-def test_a_force_beside_the_origin_of_the_tool_is_told_with_its_moment():
+@pytest.mark.parametrize("frame", ["", "tool_"])
+def test_a_force_beside_the_origin_of_the_tool_is_told_with_its_moment_and_frame(frame):
     log = make_hidden_effect_log(
         load_panda(), None, noise="low", n_trajectories=6, duration=4.0, random_state=0
     )
     own = (log.X["trajectory"] == 3).to_numpy()
-    q = log.X[[f"q{j + 1}" for j in range(7)]].to_numpy()
+    q = log.X[[f"q{j + 1}" for j in range(7)]].to_numpy()[own]
     wrench = np.array([8.0, -3.0, 5.0, 0.4, 0.3, -0.5])
+    acting = np.broadcast_to(wrench.reshape(2, 3), (len(q), 2, 3))
+    if frame:
+        turned = log.robot.forward_kinematics(q)[1]
+        acting = np.einsum("iab,ikb->ika", turned, acting)
     torque = log.y.copy()
-    torque[own] -= np.einsum("iaj,a->ij", log.robot.jacobian(q[own]), wrench)
+    torque[own] -= np.einsum("iaj,ia->ij", log.robot.jacobian(q), acting.reshape(-1, 6))
 
     (found,) = diagnose(RBDRegressor(log.robot), log.X, torque).findings
 
     assert (found.kind, found.trajectories) == ("external_wrench", (3,))
-    told = [found.parameters[f"{what}_{a}"]["value"] for what in ("force", "moment") for a in "xyz"]
+    names = [f"{frame}{what}_{a}" for what in ("force", "moment") for a in "xyz"]
+    told = [found.parameters[name]["value"] for name in names]
     np.testing.assert_allclose(told, wrench, atol=0.2)
+    assert all(f"{name} = " in found.sentence for name in names[:3])
+    assert ("turns with the tool" in found.sentence) == bool(frame)
+
+
+def test_another_load_is_one_of_other_recordings():
+    log = make_hidden_effect_log(
+        load_panda(), None, noise="low", n_trajectories=9, duration=4.0, random_state=0
+    )
+    X, torque = log.X, log.y.copy()
+    motion = [X[[f"{name}{j + 1}" for j in range(7)]].to_numpy() for name in ("q", "dq", "ddq")]
+    load = np.array([1.0, 0.02, 0.0, 0.05, 0.003, 0.0, 0.0, 0.003, 0.0, 0.001])
+    loads = {(1, 4): 0.9, (6, 7): 0.4}  # kg
+    for recordings, mass in loads.items():
+        bodies = log.robot.inertial_parameters.copy()
+        change = -log.robot.inverse_dynamics(*motion, parameters=bodies)
+        bodies[-1] += mass * load
+        change += log.robot.inverse_dynamics(*motion, parameters=bodies)
+        own = X["trajectory"].isin(recordings).to_numpy()
+        torque[own] += change[own]
+
+    found = diagnose(RBDRegressor(log.robot), X, torque).findings
+
+    carried = {k: f.parameters["mass"]["value"] for f in found for k in f.trajectories}
+    assert {f.kind for f in found} == {"payload"}
+    expected = {k: mass for recordings, mass in loads.items() for k in recordings}
+    assert carried == pytest.approx(expected, rel=0.05)

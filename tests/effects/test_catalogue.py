@@ -136,6 +136,9 @@ NATIVE = {
     "end_stop": Native((2,), "q_lim", 0.6, edit=stiff_limits),
 }
 
+#: Of these, some that need most of what all of them need of other packages.
+QUICK = ("rotor_inertia", "coupled_friction", "external_wrench")
+
 
 def motion(rng, n, seconds=6.0, step=0.01):
     t = np.arange(0, seconds, step)
@@ -196,7 +199,10 @@ def simulate(native, path):
     return robot, pd.concat(tables, ignore_index=True), np.vstack(torques)
 
 
-@pytest.mark.parametrize("kind", NATIVE)
+@pytest.mark.parametrize(
+    "kind",
+    [kind if kind in QUICK else pytest.param(kind, marks=pytest.mark.slow) for kind in NATIVE],
+)
 def test_what_mujoco_has_natively_is_named_and_sized(kind, tmp_path):
     native = NATIVE[kind]
     robot, X, torque = simulate(native, tmp_path / "arm.xml")
@@ -219,6 +225,7 @@ def test_every_kind_has_its_test():
     assert {*KINDS, *NATIVE, *ELSEWHERE} == set(list_effects())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_simulated_effect_is_named_with_its_joints_and_size(kind):
     load, name, tolerance = KINDS[kind]

@@ -40,6 +40,8 @@ def test_stribeck_friction_may_fade_as_a_lorentz_curve(signals, columns_of):
 def test_dry_friction_may_turn_gradually(signals, columns_of):
     rounded = columns_of("coulomb", signals, rounding=0.1)[:, 0]
     np.testing.assert_allclose(rounded, np.tanh(signals.dq[:, 0] / 0.1))
+    slower = columns_of("coulomb", signals, rounding=0.1, arctangent=1.0)[:, 0]
+    np.testing.assert_allclose(slower, np.arctan(signals.dq[:, 0] / 0.1) * 2 / np.pi)
 
 
 def test_friction_of_one_direction_alone(signals, columns_of):

@@ -119,6 +119,7 @@ def test_the_simulated_motion_is_that_of_the_log(robot, log):
     assert errors.position[0] < 0.01 * errors.resting[0]
 
 
+@pytest.mark.slow
 def test_they_are_tried_only_if_they_are_asked_for(robot, log):
     assert not set(KINDS.values()) & set(searched_kinds())
     X, y = log("m4")

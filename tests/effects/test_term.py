@@ -72,6 +72,12 @@ def test_a_term_knows_its_columns():
     assert Term("time_delay", (1,)).limits.tolist() == [0.1]
 
 
+def test_what_is_stored_of_a_term_is_what_it_was_made_of():
+    term = Term("dahl", (1,), {"presliding": 0.02})
+    assert hash(term) == hash(Term("dahl", (1,), {"presliding": 0.02}))
+    assert term.__getstate__() == {"kind": "dahl", "joints": (1,), "shape": {"presliding": 0.02}}
+
+
 def test_a_sum_of_terms_has_one_block_of_coefficients():
     whole = Term("viscous", (1,)) + Term("asymmetric_friction", (1,)) + [Term("offset", (2,))]
     assert isinstance(whole, TermSum)

@@ -3,7 +3,18 @@
 
 import numpy as np
 
-from skidyn.effects import Term, get_effect
+from skidyn.effects import Signals, Term, get_effect
+from skidyn.robots import Robot
+
+GANTRY = """<robot name="gantry"><link name="base"/>
+<link name="x"><inertial><mass value="5"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0"
+izz="1"/></inertial></link>
+<link name="z"><inertial><mass value="2"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0"
+izz="1"/></inertial></link>
+<joint name="1" type="prismatic"><parent link="base"/><child link="x"/><axis xyz="1 0 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="2" type="prismatic"><parent link="x"/><child link="z"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
 
 
 def test_payload_is_a_heavier_last_link(signals, robot):
@@ -34,6 +45,24 @@ def test_a_moment_works_against_the_turning_of_the_tool(signals):
     for j in range(2):
         axis = signals.robot.jacobian(signals.q)[:, 3:, j]
         np.testing.assert_allclose(blocks[j][:, 3:] @ moment, -axis @ moment, atol=1e-12)
+
+
+def test_a_force_that_turns_with_the_tool_is_one_in_its_frame(signals, robot):
+    effect = get_effect("external_wrench")
+    fixed = effect.torque_columns(signals, (0, 1))
+    turning = effect.torque_columns(signals, (0, 1), on_tool=1.0)
+    force = np.array([1.0, -2.0, 0.5])
+    in_base = robot.forward_kinematics(signals.q)[1] @ force
+    for j in range(2):
+        expected = np.sum(fixed[j][:, :3] * in_base, axis=1)
+        np.testing.assert_allclose(turning[j][:, :3] @ force, expected, atol=1e-12)
+
+
+def test_a_tool_that_does_not_turn_has_one_frame():
+    robot = Robot.from_urdf(GANTRY)
+    q = np.random.default_rng(0).normal(size=(50, robot.n_joints))
+    signals = Signals(q, q, q, np.zeros(50, dtype=int), robot=robot)
+    assert get_effect("external_wrench").grid(signals, tuple(range(robot.n_joints))) == [{}]
 
 
 def test_contact_only_below_its_plane(signals, robot):

@@ -34,6 +34,16 @@ def test_windows_have_unit_noise_gain_and_stay_in_their_trajectory(signals):
     assert set(rows.quarter[0]) == {0, 1, 2, 3}
 
 
+def test_rows_some_time_apart_are_in_one_trajectory(signals):
+    rows = window_rows(signals, np.ones((800, 1), dtype=bool))
+    shuffled = rows.taken([np.random.default_rng(0).permutation(rows.counts[0])])
+    order, earlier = shuffled.in_time(0), shuffled.earlier(0, 2)
+    time, trajectory = shuffled.time[0][order], shuffled.trajectory[0][order]
+    np.testing.assert_array_equal(trajectory[earlier], trajectory[earlier + 2])
+    np.testing.assert_allclose(time[earlier + 2] - time[earlier], 2 * rows.hop)
+    assert len(earlier) == len(order) - 2 * 2
+
+
 def test_rest_and_reversals_do_not_slide(signals):
     sliding = sliding_samples(signals, np.ones((800, 1), dtype=bool), margin=3)
     turn = int(np.pi / 4 / 0.01)

@@ -2,12 +2,14 @@
 """Steps of the output-error estimator stay among the bodies that can exist."""
 
 import numpy as np
+import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.identification import RBDRegressor, is_consistent
 from skidyn.simulation import simulation_errors
 
 
+@pytest.mark.slow
 def test_consistent_refines_where_the_torque_asks_for_impossible_bodies():
     """Steps past the possible bodies would end with the advice to use what was used."""
     clean = make_hidden_effect_log(

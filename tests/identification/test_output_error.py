@@ -18,6 +18,7 @@ def clean():
     )
 
 
+@pytest.mark.slow
 def test_simulates_better_than_least_squares_of_a_slow_log(clean):
     """At 12.5 Hz accelerations are smoothed away, which biases least squares."""
     train = (clean.frame["trajectory"] <= 3).to_numpy()

@@ -108,6 +108,7 @@ def test_any_joint_name_is_kept_or_refused(chain, name):
         pass
 
 
+@pytest.mark.slow
 def test_ten_thousand_joints_are_read(chain):
     robot = Robot.from_urdf(chain([f"j{k}" for k in range(10_000)]))
     assert robot.n_joints == 10_000

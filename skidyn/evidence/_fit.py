@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Weighted least squares of averaged rows, and of a joint by itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.effects import TermSum
+from skidyn.evidence._folds import RIDGE, Normal
+
+#: Combinations of columns smaller than the root of this, relative to their parts, may be
+#: undetermined.
+LARGEST_RIDGE = 1e-6
+#: Directions weaker than this, relative to the strongest one, are due to rounding.
+RANK = 1e-7
+#: Rows for each direction of the columns of a joint from which its residual determines its noise.
+ROWS_A_DIRECTION = 2.0
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A weighted least-squares fit of the model with some terms.
+
+    Attributes
+    ----------
+    terms : TermSum
+        Terms beside the rigid body, in the order of the coefficients.
+    coefficients : ndarray of shape (n_coefficients,)
+        First the rigid body's independent parameters, then those of the terms.
+    residual : list of ndarray of shape (n_rows_j,)
+        Residual of the averaged rows of every joint, N m or N.
+    sigma : ndarray of shape (n_joints,)
+        Noise of one row of every joint, by which the rows were weighted.
+    """
+
+    terms: TermSum
+    coefficients: Array
+    residual: list[Array]
+    sigma: Array
+
+    @property
+    def noise(self) -> Array:
+        """Root mean square of the residual rows of every joint."""
+        return np.array([np.sqrt(np.mean(r**2)) + 1e-100 if len(r) else 1.0 for r in self.residual])
+
+
+@dataclass(frozen=True)
+class FittedAlone:
+    """Residual of a joint fitted by itself, so that errors of other joints have no influence.
+
+    Attributes
+    ----------
+    left, whole : float
+        Squared residual and squared torque.
+    rank : int
+        Number of directions of the columns that the rows determine.
+    """
+
+    left: float
+    whole: float
+    rank: int
+
+    @classmethod
+    def of(cls, design: Array, target: Array) -> FittedAlone:
+        """Fit rows, or their triangular factor."""
+        if not len(target):
+            return cls(0.0, 0.0, 0)
+        size = np.linalg.norm(design, axis=0)
+        used = size > 0
+        scaled = design[:, used] / size[used]
+        solution, _, rank, _ = np.linalg.lstsq(scaled, target, rcond=RANK)
+        left, whole = np.sum((target - scaled @ solution) ** 2), np.sum(target**2)
+        return cls(float(left), float(whole), int(rank))
+
+    def noise(self, count: float, rows: float | None = None) -> float:
+        """Root of the squared residual divided by ``count``.
+
+        ``rows``, by default the same, is the number of rows that were fitted. With too few rows to
+        determine the noise, the torque itself is its bound; without any, the noise is 1.
+        """
+        if not count:
+            return 1.0
+        rows = count if rows is None else rows
+        left = self.left
+        if rows <= ROWS_A_DIRECTION * self.rank:
+            left = self.whole  # of a joint that hardly slides: a few rows are fitted by anything
+        return float(np.sqrt(max(left, RANK**2 * self.whole) / count)) or 1.0
+
+
+def own_noise(design: Array, target: Array, count: float, rows: float | None = None) -> float:
+    """Noise of a joint fitted alone (:meth:`FittedAlone.noise`)."""
+    return FittedAlone.of(design, target).noise(count, rows)
+
+
+def weighted_least_squares(design: list[Array], target: list[Array], sigma: Array) -> Array:
+    """Coefficients of least squares with joints weighted by their noise."""
+    return fit_weighted(TermSum(), design, target, sigma).coefficients
+
+
+def fit_weighted(terms: TermSum, design: list[Array], target: list[Array], sigma: Array) -> Fit:
+    """Least squares of all joints with rows weighted by the noise of their joint."""
+    a = np.empty((sum(map(len, design)), design[0].shape[1]))
+    ends = np.cumsum([0, *map(len, design)])
+    for block, s, start, stop in zip(design, sigma, ends[:-1], ends[1:], strict=True):
+        np.divide(block, s, out=a[start:stop])
+    y = np.concatenate([t / s for t, s in zip(target, sigma, strict=True)])
+    size = np.linalg.norm(a, axis=0)
+    size[size == 0] = 1.0
+    unit = a / size
+    # No single column explains more than the whole torque. Undetermined quantities, such as the
+    # share of a rotor in an inertia, are set by the smallest corrections, so that the loads of the
+    # joints, which depend on them, stay realistic.
+    ridge = max(RIDGE, 1 / max(float(y @ y), 1 / LARGEST_RIDGE))
+    normal = Normal(unit.T @ unit, unit.T @ y, np.ones(len(size)), ridge)
+    # One refinement step recovers the accuracy lost by forming the Gram matrix.
+    scaled = normal.solution + normal.solve(unit.T @ (y - a @ (normal.solution / size)))
+    coefficients = scaled / size
+    residual = [t - block @ coefficients for block, t in zip(design, target, strict=True)]
+    return Fit(terms, coefficients, residual, np.asarray(sigma, dtype=float))

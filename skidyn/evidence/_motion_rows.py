@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Averaging windows of a motion and the folds into which they fall."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array, Signals
+from skidyn.evidence._broken import without_broken
+from skidyn.evidence._kinematics import smooth_motion
+from skidyn.evidence._rows import (
+    FEWEST_SAMPLES,
+    WINDOW,
+    Rows,
+    column_step,
+    every_sample,
+    sliding_samples,
+    window_rows,
+)
+
+#: Folds are whole trajectories if there are more than this many, else blocks of them.
+FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS = 6, 8, 20
+#: Share of the smoother's half width that is left out around rest and reversals, and number of
+#: samples left out where a model of hysteresis describes the motion between the two.
+MARGIN, SHORT_MARGIN = 0.75, 1
+#: Rows whose middle is nearer than this, or half a window, to the border between two blocks are
+#: dropped, in s.
+WINDOW_GUARD = 1 / 16
+#: Rows of a joint at least: fewer are fitted by its own friction and inertia, whatever else acts.
+FEWEST_ROWS = 12
+
+#: Rows, the fold of every row by joint, the number of folds, and whether they are whole
+#: trajectories.
+RowsAndFolds = tuple[Rows, list[NDArray[np.int64]], int, bool]
+
+
+def read_motion(signals: Signals, smooth: bool, torque: Array) -> Signals:
+    """Motion as used by the rows, smoothed or as logged, without broken samples."""
+    if signals.time is None:
+        return signals
+    motion = without_broken(smooth_motion(signals), signals, torque)
+    return motion if smooth else motion.with_(q=signals.q, dq=signals.dq, ddq=signals.ddq)
+
+
+def motion_rows(signals: Signals, reversals: Sequence[int], window: float = WINDOW) -> Rows:
+    """Averaging windows over the samples that count."""
+    if signals.time is None:
+        return every_sample(signals)
+    margin = np.full(signals.n_joints, max(1, round(MARGIN * signals.half_width)))
+    margin[list(reversals)] = SHORT_MARGIN
+    use = sliding_samples(signals, signals.usable, margin.tolist())
+    step = column_step(signals, window, int(margin.min()))
+    rows = window_rows(signals, use, window, step)
+    few = rows.counts < FEWEST_ROWS
+    if not (few & (rows.counts > 0)).any():
+        return rows
+    use = use & ~few  # a joint that slides for a moment only is treated as one at rest
+    return window_rows(signals, use, window, step)
+
+
+def rows_and_folds(
+    signals: Signals,
+    reversals: Sequence[int],
+    weight: Array | None = None,
+    window: float = WINDOW,
+) -> RowsAndFolds:
+    """Averaging windows and the folds they fall into."""
+    # A slow log has wider windows, which extend further over a border; single samples do not.
+    clock = signals.time is not None
+    guard = max(WINDOW_GUARD, _half_window(signals.rate)) if clock else 0.0
+    rows = motion_rows(signals, reversals, window)
+    return _folds(rows if weight is None else rows.weighted(weight), guard)
+
+
+def _half_window(rate: float) -> float:
+    return FEWEST_SAMPLES / rate / 2
+
+
+def _folds(rows: Rows, guard: float) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
+    """Assign rows to folds and sort them; blocks of few trajectories lose the rows at borders."""
+    names = np.unique(np.concatenate(rows.trajectory))
+    whole = len(names) > FEW_TRAJECTORIES
+    blocks = 1 if whole else max(2, -(-FEWEST_BLOCKS // max(1, len(names))))
+    ends = {}
+    for name in names:
+        times = np.concatenate(
+            [t[k == name] for t, k in zip(rows.time, rows.trajectory, strict=True)]
+        )
+        ends[name] = np.linspace(times.min(), times.max() + 1e-9, blocks + 1)
+    n_folds = min(len(names) * blocks, MOST_FOLDS) if whole else len(names) * blocks
+    fold, order = [], []
+    for time, trajectory in zip(rows.time, rows.trajectory, strict=True):
+        label = np.searchsorted(names, trajectory) * blocks
+        keep = np.ones(len(time), dtype=bool)
+        for name in names:
+            inside = np.flatnonzero(trajectory == name)
+            edges = ends[name][1:-1]
+            label[inside] += np.searchsorted(edges, time[inside], side="right")
+            for edge in edges:
+                near = np.abs(time[inside] - edge) < guard
+                keep[inside[near]] = False
+        label = label * n_folds // (len(names) * blocks)
+        index = np.flatnonzero(keep)
+        index = index[np.argsort(label[index], kind="stable")]
+        fold.append(label[index])
+        order.append(index)
+    return rows.taken(order), fold, n_folds, whole
