@@ -32,6 +32,8 @@ NEARLY = 0.008
 FAR = 1e-3
 #: Least velocity of rows that count, in rad/s (a tenth of it in m/s).
 SLIDING = 0.05
+#: Rows that are worth one, since noise is correlated.
+CORRELATED = 2.0
 #: Nodes of a function of the position; numbers of recordings that may carry loads of their own.
 PLACES, FEW_RUNS, MOST_RUNS = 8, 1, 8
 #: Largest share of the torque's spread that the fit of a joint may leave for its lag to count.
@@ -167,13 +169,16 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
         use = _sliding(fits, s, j)
         if not fits.usable(j) or use.sum() < FEWEST:
             continue
-        own = np.column_stack([_own_columns(s, j), _of_position(s, j)])
         felt = regressor[use, j]
-        columns = np.column_stack([felt, fits.average(own)[use]])
+        plain = np.column_stack([felt, fits.average(_own_columns(s, j))[use]])
+        columns = np.column_stack([plain, fits.average(_of_position(s, j))[use]])
+        y = np.stack([torque[use, j] for torque in shifted], axis=1)
+        known = _basis(plain)
         basis = _basis(np.column_stack([columns, _by_recording(felt, run_of[use])]))
+        if not _needed(known, basis, y):
+            columns, basis = plain, known
         if basis.shape[1] > 0.5 * len(basis):
             continue
-        y = np.stack([torque[use, j] for torque in shifted], axis=1)
         rest = y - basis @ (basis.T @ y)
         spread = float(np.sum((y[:, middle] - y[:, middle].mean()) ** 2))
         errors = np.stack([(part**2).sum(axis=0) for part in np.array_split(rest, GROUPS)])
@@ -426,6 +431,21 @@ def _basis(columns: Array) -> Array:
     columns = columns[:, np.abs(columns).max(axis=0) > 0]
     basis, values, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
     return np.asarray(basis[:, values > 1e-6 * values[0]])
+
+
+def _needed(known: Array, wider: Array, torque: Array) -> bool:
+    """Whether further columns explain more than chance, by the Bayesian information criterion.
+
+    If nothing is missing, they would only follow part of the lag.
+    """
+    n, further = len(known), wider.shape[1] - known.shape[1]
+    if wider.shape[1] > 0.5 * n:
+        return False
+    left, least = (
+        float(np.min(np.sum((torque - basis @ (basis.T @ torque)) ** 2, axis=0)))
+        for basis in (known, wider)
+    )
+    return n * np.log(left / max(least, 1e-300)) > CORRELATED * further * np.log(n)
 
 
 def _by_recording(regressor: Array, run_of: Array) -> Array:
