@@ -289,8 +289,8 @@ def _other_rate(fits: Fits, odd: bool) -> float | None:
     """Rate of clock and velocities that explains the torque better; None if there is none.
 
     Inertia grows with its square and gravity does not, so no scale of a torque is equivalent. If
-    the scales of some torques are odd, it must make all of them usual, or identified bodies, which
-    know nothing of scales, must confirm it.
+    the scales of some torques are odd, it must make all of them usual, or identified bodies,
+    which have no scale, must confirm it.
     """
     few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
     best, log = max((_rate_gain(few, rate, 1), float(np.log(rate))) for rate in RATES)

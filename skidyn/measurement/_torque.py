@@ -434,7 +434,7 @@ class TorqueDelay(Check):
             )
         if odd:
             return
-        # a joint whose lag is not known to itself agrees with nothing
+        # a joint whose own lag is uncertain agrees with any
         use = np.isfinite(found.joints) & (found.errors < max(abs(found.common), SMALLEST))
         # nor one whose lag is another in its faster rows, as that of a missing effect
         slow, fast = found.halves.T
