@@ -445,7 +445,7 @@ def _needed(known: Array, wider: Array, torque: Array) -> bool:
         float(np.min(np.sum((torque - basis @ (basis.T @ torque)) ** 2, axis=0)))
         for basis in (known, wider)
     )
-    return n * np.log(left / max(least, 1e-300)) > CORRELATED * further * np.log(n)
+    return bool(n * np.log(left / max(least, 1e-300)) > CORRELATED * further * np.log(n))
 
 
 def _by_recording(regressor: Array, run_of: Array) -> Array:
