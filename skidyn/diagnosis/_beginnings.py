@@ -9,7 +9,7 @@ repeated without them. Its result counts if it finds such a link, and fails in t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,7 @@ from skidyn.diagnosis._rule import (
     BEGINNING_RESONANCE,
     BEGINNING_STANDS_OUT,
 )
+from skidyn.effects import get_effect
 from skidyn.evidence import Problem, with_reversals
 
 #: Result of the first search, the problem of the closer ones, and their result.
@@ -32,7 +33,10 @@ Searched = tuple[SearchResult, Problem, SearchResult]
 
 
 def look_after_beginnings(
-    problem: Problem, searched: Searched, search: Callable[[Problem], Searched]
+    problem: Problem,
+    searched: Searched,
+    kinds: Iterable[str],
+    search: Callable[[Problem], Searched],
 ) -> tuple[Problem, Searched, str]:
     """Search again without the beginnings of recordings if a link may swing there.
 
@@ -42,6 +46,8 @@ def look_after_beginnings(
         Problem of all samples.
     searched : tuple of SearchResult, Problem and SearchResult
         What was found in it.
+    kinds : iterable of str
+        Kinds of the catalogue to try; without one of a link that oscillates, nothing is searched.
     search : callable
         All searches in a problem.
 
@@ -54,16 +60,17 @@ def look_after_beginnings(
     note : str
         What was left out, and why; empty if nothing was.
     """
-    if problem.signals.time is None:
+    if problem.signals.time is None or not any(get_effect(k).follows_acceleration for k in kinds):
         return problem, searched, ""
     swing = _slowest_swing(searched)
     sliding, signals = problem.rows.sliding, problem.signals
     for _ in range(2):  # again if the swing that is found is slower
         length = BEGINNING_LEFT / (2 * np.pi * BEGINNING_DAMPING * (swing or BEGINNING_RESONANCE))
-        early = beginnings(problem, length)[:, None]
-        fails = _standing_out(searched, sliding & early, sliding & ~early) > BEGINNING_STANDS_OUT
-        if not swing and not fails.any():
-            return problem, searched, ""
+        early = _beginnings(problem, length)[:, None]
+        if not swing:
+            ratio = _standing_out(searched, sliding & early, sliding & ~early)
+            if not np.any(ratio > BEGINNING_STANDS_OUT):
+                return problem, searched, ""
         settled = signals.with_(valid=signals.usable & ~early)
         later = with_reversals(replace(problem, signals=settled), problem.terms, ())
         if not later.rows.counts.any():
@@ -88,7 +95,7 @@ def look_after_beginnings(
     return later, found, note
 
 
-def beginnings(problem: Problem, length: float) -> NDArray[np.bool_]:
+def _beginnings(problem: Problem, length: float) -> NDArray[np.bool_]:
     """Samples in the first seconds of the recordings, but in no more than half of each.
 
     Parameters

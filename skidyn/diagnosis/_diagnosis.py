@@ -318,7 +318,7 @@ def _diagnose(
             problem = posed()  # without data of the previous search
         found = _search(problem, kinds, settings, vibration=steady)
     problem, (result, wider, completed), left_out = look_after_beginnings(
-        problem, found, lambda later: _search(later, kinds, settings, vibration=steady)
+        problem, found, kinds, lambda later: _search(later, kinds, settings, vibration=steady)
     )
     notes += [left_out] if left_out else []
     limits = _limits(problem, result, completed, settings)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._crosstalk import find_shares
-from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading, friction
+from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading, friction, lines_between
 from skidyn.measurement._gains import Scales, refined_scales
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._peak import peak
@@ -55,9 +55,9 @@ WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
 #: Error of any bodies, as a share of the spread, and in errors of the mean of a row, from which a
 #: torque is nearly unrelated to the motion.
 UNRELATED, BEYOND = 0.67, 4.0
-#: Least share of it that any function of the position must leave, the nodes of such a function, the
-#: fewest parts of a log that are predicted by the others, and the least share of it that can be.
-LEFT, PLACES, FEWEST_PARTS, MOSTLY = 0.8, 8, 3, 0.5
+#: Least share of it that any function of the position must leave, the fewest parts of a log that
+#: are predicted by the others, and the least share of it that can be.
+LEFT, FEWEST_PARTS, MOSTLY = 0.8, 3, 0.5
 #: Largest share of friction, and that of the joint in the middle, where there is none.
 FRICTIONLESS, HARDLY = 0.12, 0.05
 #: A computed torque: largest difference from that of the stated bodies, largest share of friction,
@@ -499,8 +499,7 @@ def _left_by_position(seen: Explained, k: int) -> float:
     part = seen.fits.signals.trajectory[::SAMPLES][use]
     if len(np.unique(part)) < FEWEST_PARTS:
         part = np.arange(len(q)) * FEWEST_PARTS // len(q)
-    nodes = np.unique(np.quantile(q, np.linspace(0, 1, PLACES)))
-    hats = np.stack([np.interp(q, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
+    hats = lines_between(q)
     rest, known = residual.copy(), np.zeros(len(q), dtype=bool)
     for one in np.unique(part):
         out = part == one

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
-from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction
+from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction, lines_between
 from skidyn.measurement._peak import peak
 from skidyn.measurement._robust import FEWEST, RobustFit, fit_together
 from skidyn.robots import base_parameter_index
@@ -34,8 +34,8 @@ FAR = 1e-3
 SLIDING = 0.05
 #: Rows that are worth one, since noise is correlated.
 CORRELATED = 2.0
-#: Nodes of a function of the position; numbers of recordings that may carry loads of their own.
-PLACES, FEW_RUNS, MOST_RUNS = 8, 1, 8
+#: Numbers of recordings that may carry loads of their own.
+FEW_RUNS, MOST_RUNS = 1, 8
 #: Largest share of the torque's spread that the fit of a joint may leave for its lag to count.
 LEFT = 0.5
 
@@ -171,12 +171,13 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
             continue
         felt = regressor[use, j]
         plain = np.column_stack([felt, fits.average(_own_columns(s, j))[use]])
-        columns = np.column_stack([plain, fits.average(_of_position(s, j))[use]])
+        further = fits.average(lines_between(s.q[:, j]))[use]
         y = np.stack([torque[use, j] for torque in shifted], axis=1)
-        known = _basis(plain)
-        basis = _basis(np.column_stack([columns, _by_recording(felt, run_of[use])]))
-        if not _needed(known, basis, y):
-            columns, basis = plain, known
+        shared = basis = _basis(plain)
+        wider = _basis(np.column_stack([plain, further, _by_recording(felt, run_of[use])]))
+        if _needed(basis, wider, y):
+            # a load of a recording would follow part of its own lag
+            shared, basis = _basis(np.column_stack([plain, further])), wider
         if basis.shape[1] > 0.5 * len(basis):
             continue
         rest = y - basis @ (basis.T @ y)
@@ -189,8 +190,7 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
             beyond += 1
             continue
         tables.append((len(rest), errors))
-        # a load of a recording would follow part of its own lag
-        for run, cost in _run_costs(_basis(columns), y, run_of[use]):
+        for run, cost in _run_costs(shared, y, run_of[use]):
             squares.setdefault(run, []).append(cost)
             counts[run] = counts.get(run, 0) + int(np.sum(run_of[use] == run))
         sooner = rest * first[use][:, None]
@@ -292,8 +292,14 @@ def _of_runs(
         agreeing = float(weight[near].sum()) / total
         left, before = (np.sqrt(2 * float(whole[run][x]) / counts[run]) for x in (there, here))
         found[run] = RunDelay(
-            *(lag - usual, error, float(gains.sum()), agreeing, float(left), float(before), usual),
-            int(np.sum(near & (gains > 0))),
+            lag - usual,
+            error,
+            float(gains.sum()),
+            agreeing,
+            float(left),
+            float(before),
+            usual,
+            joints=int(np.sum(near & (gains > 0))),
         )
     return found, beyond
 
@@ -455,13 +461,6 @@ def _by_recording(regressor: Array, run_of: Array) -> Array:
     if not FEW_RUNS < len(runs) <= MOST_RUNS:
         return np.zeros((len(load), 0))
     return np.hstack([load * (run_of == run)[:, None] for run in runs[1:]])
-
-
-def _of_position(signals: Signals, joint: int) -> Array:
-    """Any slow function of the position, as of a spring that is missing."""
-    q = signals.q[:, joint]
-    nodes = np.unique(np.quantile(q, np.linspace(0, 1, PLACES)))
-    return np.stack([np.interp(q, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
 
 
 def _bent_friction(signals: Signals, joint: int) -> Array:

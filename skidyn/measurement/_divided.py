@@ -21,7 +21,7 @@ from skidyn._signals import Array
 from skidyn.measurement._bodies import explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
-from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading
+from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading, lines_between
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._robust import fit_at_once, fit_together
 from skidyn.measurement._suspicion import Suspicion
@@ -36,8 +36,8 @@ WORTH = 0.08
 #: How nearly the multiples of either group must be the same, as a share, and what they may differ
 #: by without a mistake: a payload or friction that changes.
 ALIKE, USUAL = 0.25, (0.4, 2.5)
-#: Rounds of the fit of multiples, its ridge, and nodes of a function of the position.
-ROUNDS, RIDGE, PLACES = 12, 1e-6, 8
+#: Rounds of the fit of multiples, and its ridge.
+ROUNDS, RIDGE = 12, 1e-6
 #: Log-likelihood that two groups must gain with identified bodies, the share of the residual that
 #: they must take off, and what they may leave of what the best effect leaves.
 SURE, DROP, BETTER = 40.0, 0.4, 0.8
@@ -163,9 +163,7 @@ def _flexible(fits: Fits, k: int) -> Array:
     """Columns of the torque of a joint: bodies of its own, and any function of its position."""
     _, use = fits.mean_torque(k)
     q = fits.average(fits.signals.q[:, k])[use]
-    nodes = np.unique(np.quantile(q, np.linspace(0, 1, PLACES)))
-    hats = np.stack([np.interp(q, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
-    return np.hstack([fits.felt(k)[0][use], hats])
+    return np.hstack([fits.felt(k)[0][use], lines_between(q)])
 
 
 def _refined(columns: Array, y: Array, odd: NDArray[np.bool_], value: float) -> float:

@@ -30,6 +30,8 @@ from skidyn.measurement._robust import (
 )
 from skidyn.robots import Robot, base_parameter_index, with_whole_turns
 
+#: Nodes of a function of the position.
+PLACES = 8
 #: Width of a row in s and the samples in it; most rows used, over all intervals of the log.
 WIDTH, SAMPLES, MOST_ROWS = 0.125, 6, 1200
 #: Columns of a joint in addition to those of the bodies: friction, rotor inertia and a constant.
@@ -526,6 +528,26 @@ def friction(signals: Signals, joint: int) -> Array:
     dq = signals.dq[:, joint]
     sign = np.tanh(dq / (SIGN_BLUR * signals.unit[joint]))
     return np.column_stack([dq, sign, signals.ddq[:, joint]])
+
+
+def lines_between(position: Array) -> Array:
+    """Columns of any slow function of a position, as of a spring that is missing.
+
+    These are broken lines between a few quantiles; as many nodes as for a constant each could
+    follow slow noise.
+
+    Parameters
+    ----------
+    position : ndarray of shape (n_rows,), rad or m
+        Position of a joint.
+
+    Returns
+    -------
+    ndarray of shape (n_rows, at most 8)
+        They sum to 1.
+    """
+    nodes = np.unique(np.quantile(position, np.linspace(0, 1, PLACES)))
+    return np.stack([np.interp(position, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
 
 
 def smoothed(signals: Signals) -> Signals:

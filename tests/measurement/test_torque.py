@@ -37,18 +37,12 @@ def test_torque_cut_at_zero(signals, torque, found):
     assert told[0].remedy is None
 
 
-def test_torque_of_one_joint_that_is_late(arm, told_of):
-    log = make_hidden_effect_log(arm, None, n_trajectories=5, duration=6.0, random_state=5)
-    frame = log.frame
-    late = frame.groupby("trajectory")["tau2"].shift(3).bfill()
-    told = told_of(frame.assign(tau2=late))["torque_delay"]
-    assert told.joints == (2,) and told.remedy.option.startswith("--late tau2=0.0")
-
-
-def test_a_spring_that_is_missing_does_not_hide_the_lag_of_its_joint(arm, told_of):
-    log = make_hidden_effect_log(
-        arm, "spring", n_trajectories=5, duration=6.0, random_state=7319357
-    )
+@pytest.mark.parametrize(
+    ("missing", "seed"), [(None, 5), ("spring", 7319357), ("payload", 7319354)]
+)
+def test_torque_of_one_joint_that_is_late(arm, told_of, missing, seed):
+    """A spring that is missing, or loads of single recordings, do not hide its lag."""
+    log = make_hidden_effect_log(arm, missing, n_trajectories=5, duration=6.0, random_state=seed)
     late = log.frame.groupby("trajectory")["tau2"].shift(3).bfill()
     told = told_of(log.frame.assign(tau2=late))["torque_delay"]
     assert told.joints == (2,) and told.remedy.option.startswith("--late tau2=0.0")
@@ -63,15 +57,6 @@ def test_a_delay_between_two_samples_is_no_low_pass():
             frame.loc[run.index, name] = np.interp(run["time"] - 0.014, run["time"], run[name])
     told = {s.check: s for s in check_log(frame, robot).checks}["torque_delay"]
     assert told.remedy.option.startswith("--late tau=0.01")
-
-
-def test_loads_of_single_recordings_do_not_hide_the_lag_of_a_joint(arm, told_of):
-    log = make_hidden_effect_log(
-        arm, "payload", n_trajectories=5, duration=6.0, random_state=7319354
-    )
-    late = log.frame.groupby("trajectory")["tau2"].shift(3).bfill()
-    told = told_of(log.frame.assign(tau2=late))["torque_delay"]
-    assert told.joints == (2,) and told.remedy.option.startswith("--late tau2=0.0")
 
 
 def test_coarse_positions_are_not_late(arm, told_of):
