@@ -36,7 +36,7 @@ from skidyn.diagnosis._rule import (
 from skidyn.diagnosis._screen import Model, Screen
 from skidyn.diagnosis._search_state import SearchState
 from skidyn.diagnosis._spectrum import Line, find_lines, find_vibrations
-from skidyn.diagnosis._split import split_effects
+from skidyn.diagnosis._split import recordings_with, split_effects
 from skidyn.effects import get_effect
 
 Mask = NDArray[np.bool_]
@@ -256,14 +256,9 @@ class RankingSearch(SearchState):
         tester = self.tester(self.chosen)
         if tester.test(candidate.rows).coefficients[0] >= 0:
             return candidate
-        loaded = {
-            k
-            for c in [*self.chosen, candidate]
-            if c.kind == candidate.kind
-            for k in c.term.trajectories or ()
-        }
-        names = self.problem.rows.recordings.tolist()
-        rest = tuple(name for name in names if name not in loaded)
+        names = self.problem.rows.recordings
+        free = ~recordings_with(candidate.kind, [*self.chosen, candidate], names)
+        rest = tuple(names[free].tolist())
         term = candidate.term.with_shape(trajectories=rest)
         other = replace(candidate, term=term, rows=self.problem.term_rows(term))
         return other if tester.test(other.rows).coefficients[0] > 0 else candidate

@@ -82,8 +82,7 @@ def split_effects(
         effect = get_effect(kind)
         if effect.search != "trajectories":
             continue
-        taken = {k for c in known if c.kind == kind for k in c.term.trajectories or names}
-        free = ~np.isin(names, list(taken))
+        free = ~recordings_with(kind, known, names)
         if free.sum() < 2:
             continue
         for shape in effect.grid(problem.few, joints):
@@ -118,6 +117,14 @@ def _best_splits(
         rows = rows_within(problem, problem.term_rows(term), chosen)
         found.append(Split(Candidate(term.kind, split, rows), drop, is_apart))
     return found
+
+
+def recordings_with(
+    kind: str, candidates: Sequence[Candidate], names: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Which of some recordings have an effect of a kind among some candidates, (n_recordings,)."""
+    own = [c.term.trajectories for c in candidates if c.kind == kind]
+    return np.isin(names, [k for some in own for k in (names if some is None else some)])
 
 
 @dataclass(frozen=True)
