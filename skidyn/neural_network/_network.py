@@ -107,7 +107,10 @@ class LSTMNetwork(nn.Module):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """Outputs of the rows after the history of every window."""
-        hidden = self.lstm(x)[0][:, self.window :]
+        # cuDNN would multiply with 10 of the 23 bits of float32, and give other torques than a CPU
+        library = torch.backends.cudnn
+        with library.flags(enabled=library.enabled, allow_tf32=False):
+            hidden = self.lstm(x)[0][:, self.window :]
         if self.dense is not None:
             hidden = self.dropout(torch.tanh(self.dense(hidden)))
         outputs: torch.Tensor = self.output(hidden)
