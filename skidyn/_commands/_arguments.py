@@ -163,7 +163,12 @@ def with_remedies(parser: Any) -> None:
         metavar="q2=1.57",
         help="recorded positions at the robot's zero; recorded velocities at rest: dq2=0.1",
     )
-    fix.add_argument("--late", metavar="tau=0.008", help="delays in s that are removed")
+    fix.add_argument(
+        "--late",
+        metavar="tau=0.008",
+        help="delays in s that are removed; 0.013+0.0005*t for one that grows with the time since "
+        "the beginning of a recording",
+    )
     fix.add_argument(
         "--lowpass",
         metavar="tau=0.04",

@@ -47,7 +47,7 @@ def read_log(
     gain: Mapping[str, float] | None = None,
     summed: Mapping[str, str] | None = None,
     zero: Mapping[str, float] | None = None,
-    late: Mapping[str, float] | None = None,
+    late: Mapping[str, float | tuple[float, float]] | None = None,
     lowpass: Mapping[str, float] | None = None,
     unwrap: bool = False,
     torque_sign: Literal["recorded", "command"] = "recorded",
@@ -110,8 +110,10 @@ def read_log(
     zero : mapping of str to float, optional
         Recorded positions at the robot's zero (rad or m), or velocities at rest, which are
         subtracted: ``{"q2": 1.5708}``.
-    late : mapping of str to float, s, optional
-        Delays of columns or quantities, which are removed: ``{"tau": 0.008}``.
+    late : mapping of str to float, s, or (float, float), s and s/s, optional
+        Delays of columns or quantities, which are removed: ``{"tau": 0.008}``; where clocks run at
+        different rates, the delay at the beginning of every recording and its growth: ``{"tau":
+        (0.013, 0.0005)}``.
     lowpass : mapping of str to float, s, optional
         Time constants of first-order low-pass filters of columns or quantities, which are undone:
         ``{"tau": 0.04}``. Noise added after the filter, such as quantization in the file, is

@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -53,7 +53,7 @@ class Remedies:
     torque_sign: Literal["recorded", "command"] = "recorded"
     clock: Literal["recorded", "regular"] = "recorded"
     drop_repeated: bool = False
-    late: Mapping[str, float] | None = None
+    late: Mapping[str, float | tuple[float, float]] | None = None
     lowpass: Mapping[str, float] | None = None
     split_leaps: bool = False
     restore_gravity: bool = False
@@ -155,16 +155,15 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
         from skidyn.preprocessing import advance_channels  # needed only here; imports scikit-learn
 
         before = len(table)
-        for name, delay in _each(remedies.late, table, "late"):
-            if not np.isfinite(delay):
-                raise LogError(f"late: the delay of {name} is {delay:g}; expected seconds.")
-        table = advance_channels(table, dict(remedies.late))
+        delays = {name: _delay(name, value) for name, value in remedies.late.items()}
+        _each(dict.fromkeys(delays, 0.0), table, "late")  # their columns exist
+        table = advance_channels(table, delays)
         if table.empty:
             raise LogError(
                 f"late: no recording is longer than the delays {dict(remedies.late)} in s, so "
                 "that no row is left."
             )
-        told = ", ".join(f"{name} by {1e3 * v:g} ms" for name, v in remedies.late.items())
+        told = ", ".join(f"{name} by {_in_words(*both)}" for name, both in delays.items())
         notes.append(
             f"late: {told} removed; {before - len(table)} of {before} rows at the ends of "
             "continuous parts left out"
@@ -273,6 +272,26 @@ def _each(
         columns = [name] if name in table.columns else joints
         told += [(column, float(value)) for column in columns]
     return told
+
+
+def _delay(name: str, value: object) -> tuple[float, float]:
+    """Delay at the beginning of recordings, s, and its growth, s/s, of a number or two."""
+    parts: list[Any] = list(value) if isinstance(value, (tuple, list)) else [value, 0.0]
+    good = len(parts) == 2 and all(
+        isinstance(x, (int, float, np.number)) and np.isfinite(x) for x in parts
+    )
+    if not good or parts[1] <= -1:  # the clock would stand still, or run backwards
+        raise LogError(
+            f"late: the delay of {name} is {value}; expected seconds, such as 0.008, or seconds at "
+            "the beginning of a recording and their growth per second, such as (0.013, 0.0005), "
+            "which is 0.013+0.0005*t on the command line."
+        )
+    return float(parts[0]), float(parts[1])
+
+
+def _in_words(lag: float, growth: float) -> str:
+    """A delay with its growth."""
+    return f"{1e3 * lag:g} ms" + (f" and {1e3 * growth:g} ms more per second" if growth else "")
 
 
 def _with_derived(table: pd.DataFrame, asked: Sequence[str], notes: list[str]) -> pd.DataFrame:
