@@ -276,9 +276,10 @@ class Fits:
         """Torque that was recorded a lag (s) after the motion of every sample, or lags of them."""
         source = self.recorded
         later = np.empty((len(source.picked), self.n_joints))
+        lags = np.broadcast_to(lag, len(later))
         for rows in source.segments:
             own = (source.picked >= rows.start) & (source.picked < rows.stop)
-            at = source.clock[source.picked[own]] + (lag[own] if np.ndim(lag) else lag)
+            at = source.clock[source.picked[own]] + lags[own]
             clock = source.clock[rows]
             for k in range(self.n_joints):
                 later[own, k] = np.interp(at, clock, source.torque[rows, k])
