@@ -151,6 +151,12 @@ def with_remedies(parser: Any) -> None:
         "motion=2,1,3",
     )
     fix.add_argument(
+        "--combine",
+        metavar="tau6=tau6+tau7,..",
+        help="replace columns by sums of recorded columns, as for the motors of a differential: "
+        "tau6=tau6+tau7,tau7=tau6-tau7",
+    )
+    fix.add_argument(
         "--gain", metavar="tau3=0.02", help="multiply columns or quantities by factors"
     )
     fix.add_argument(

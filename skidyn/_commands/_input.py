@@ -113,6 +113,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         "resample_rate": said.get("resample"),
         "order": order_option(said.get("order")),
         "flip": listed(said.get("flip")),
+        "combine": pairs("combine", said.get("combine")),
         "summed": pairs("summed", said.get("summed")),
         **{name: pairs(name, said.get(name), numbers=True) for name in NUMBERS},
         **{name: said.get(name) for name in AS_GIVEN},

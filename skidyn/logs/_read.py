@@ -44,6 +44,7 @@ def read_log(
     split_dwells: float | None = None,
     order: Sequence[int] | Mapping[str, Sequence[int]] | None = None,
     flip: Sequence[str | int] = (),
+    combine: Mapping[str, str] | None = None,
     gain: Mapping[str, float] | None = None,
     summed: Mapping[str, str] | None = None,
     zero: Mapping[str, float] | None = None,
@@ -101,6 +102,10 @@ def read_log(
     flip : sequence of str or int, default=()
         Signals whose sign is changed: a joint, by name or number, means its torque; ``"q3"`` its
         position with velocity and acceleration; ``"dq3"`` or ``"tau3"`` one column.
+    combine : mapping of str to str, optional
+        Sums of recorded columns that replace columns: ``{"tau6": "tau6+tau7", "tau7":
+        "tau6-tau7"}`` for the torques of the motors of a differential; terms may have factors,
+        ``"0.5*tau6-0.5*tau7"``.
     gain : mapping, optional
         Factors of columns or quantities: ``{"tau3": 0.02}``.
     summed : mapping of str to str, optional
@@ -191,6 +196,7 @@ def read_log(
         Remedies(
             order=order,
             flip=flip,
+            combine=combine,
             gain=gain,
             summed=summed,
             zero=zero,

@@ -26,6 +26,7 @@ BELOW = 0.01
 #: Beginning of the notes of remedies.
 REMEDIES = (
     "flip:",
+    "combine:",
     "gain:",
     "summed:",
     "zero:",
@@ -46,6 +47,7 @@ class Remedies:
 
     order: Sequence[int] | Mapping[str, Sequence[int]] | None = None
     flip: Sequence[str | int] = ()
+    combine: Mapping[str, str] | None = None
     gain: Mapping[str, float] | None = None
     summed: Mapping[str, str] | None = None
     zero: Mapping[str, float] | None = None
@@ -65,8 +67,9 @@ def mend_columns(
 ) -> pd.DataFrame:
     """Order, sign, scale, sums and zero of columns; what was done is appended to ``notes``.
 
-    A LogError is raised if a joint or column does not exist, an order is invalid, a gain is zero or
-    not finite, a position includes itself, or there are no commanded positions for the sign.
+    A LogError is raised if a joint or column does not exist, an order or a sum is invalid, a gain
+    is zero or not finite, a position includes itself, or there are no commanded positions for the
+    sign.
     """
     table = table.copy()
     if remedies.order is not None:
@@ -82,6 +85,8 @@ def mend_columns(
         for name in columns:
             table[name] = -table[name]
         notes.append(f"flip: the sign of {', '.join(columns)} was changed in {_all(table)} rows")
+    if remedies.combine:
+        _combine(table, remedies.combine, notes)
     for name, value in _each(remedies.gain, table, "gain"):
         if not np.isfinite(value) or value == 0:
             raise LogError(f"gain: {name} cannot be multiplied by {value}; expected a number.")
@@ -217,6 +222,35 @@ def _reorder(
         for numbers in map(list, dict.fromkeys(map(tuple, orders.values())))
     ]
     notes.append(f"order: {', '.join(said)}")
+
+
+#: One term of a sum of columns.
+_TERM = re.compile(r"([+-]?)(?:(\d+\.?\d*(?:e-?\d+)?|\.\d+)\*)?([A-Za-z_]\w*)")
+
+
+def _combine(table: pd.DataFrame, sums: Mapping[str, str], notes: list[str]) -> None:
+    """Sums of recorded columns in the place of columns, such as of the motors of a differential."""
+    recorded = table.copy()
+    for name, said in sums.items():
+        text = str(said).replace(" ", "")
+        terms = _TERM.findall(text)
+        unsigned = any(not sign for sign, _, _ in terms[1:])
+        if not terms or unsigned or "".join(_TERM.sub("", text).split()):
+            raise LogError(
+                f"combine: {name}={said} is not a sum of columns; expected for example "
+                "tau6=tau6+tau7, or tau6=0.5*tau6-0.5*tau7."
+            )
+        for column in (name, *(column for _, _, column in terms)):
+            if column not in recorded.columns or column in ("time", "trajectory"):
+                raise LogError(
+                    f"combine: {name}={said}: the log has no signal {column}; it has "
+                    f"{', '.join(map(str, recorded.columns))}."
+                )
+        table[name] = sum(
+            (-1.0 if sign == "-" else 1.0) * float(factor or 1.0) * recorded[column]
+            for sign, factor, column in terms
+        )
+        notes.append(f"combine: {name} was replaced by {text} in {_all(table)} rows")
 
 
 def _take_apart(table: pd.DataFrame, n: int, summed: Mapping[str, str], notes: list[str]) -> None:

@@ -218,8 +218,8 @@ class Columns(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         fits = measurement.fits
-        if fits is None or measurement.odd:
-            return  # contradictory recordings have no common reading
+        if fits is None or measurement.odd or measurement.mixed:
+            return  # contradictory recordings, and mixed torques, have no common reading
         changes = asked_changes(measurement, fits)
         orders = [change for change in changes if change.kind in ORDERS]
         for kind in dict.fromkeys(change.kind for change in changes):

@@ -56,6 +56,7 @@ def test_the_command_that_fixes_a_log_keeps_its_options(tmp_path, capsys):
         (["--zero", "q1"], "'q1' is not NAME=VALUE"),
         (["--gain", "tau1=much"], "'much' is not a number"),
         (["--late", "tau=0.01+much*t"], "or one that grows such as 0.013+0.0005*t"),
+        (["--combine", "tau1=tau1+volts"], "the log has no signal volts"),
         (["--gain", "tau1=0.01*t"], "'0.01*t' is not a number"),
         (["--order", "tau=1"], "is not an order of 2 joints"),
         (["--order", "2,1,tau=2,1"], "'2,1' belongs to no quantity"),

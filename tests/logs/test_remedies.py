@@ -115,6 +115,17 @@ def test_a_delay_that_grows_is_taken_out(read):
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
+def test_sums_are_those_of_recorded_columns(read):
+    mended = read(
+        LOG, combine={"tau1": "tau1 + tau2", "tau2": "-0.5*tau1-2*tau2"}, gain={"tau2": 3}
+    )
+    np.testing.assert_allclose(mended["tau1"], LOG["tau1"] + LOG["tau2"])
+    np.testing.assert_allclose(mended["tau2"], -1.5 * LOG["tau1"] - 6 * LOG["tau2"])
+    told = f"combine: tau1 was replaced by tau1+tau2 in {len(LOG)} of {len(LOG)} rows"
+    assert told in mended.attrs["notes"]
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
 def test_a_low_pass_is_undone_within_recordings(read):
     filtered = LOG.copy()
     for rows in LOG.groupby("trajectory").indices.values():
@@ -159,6 +170,13 @@ def test_sign_from_the_command(read):
         ({"zero": {"q1": float("nan")}}, "zero: q1 has the value nan"),
         ({"late": {"volts": 0.1}}, "late: the log has no volts"),
         ({"late": {"tau": 100.0}}, "late: no recording is longer than"),
+        ({"combine": {"tau1": "tau1+volts"}}, "the log has no signal volts"),
+        ({"combine": {"tau9": "tau1+tau2"}}, "the log has no signal tau9"),
+        ({"combine": {"tau1": "tau1*tau2"}}, "is not a sum of columns"),
+        ({"combine": {"tau1": "tau1tau2+"}}, "is not a sum of columns"),
+        ({"combine": {"tau1": "2"}}, "is not a sum of columns"),
+        ({"combine": {"tau1": ""}}, "is not a sum of columns"),
+        ({"combine": {"time": "tau1"}}, "the log has no signal time"),
         ({"late": {"tau": float("nan")}}, "late: the delay of tau is nan"),
         ({"late": {"tau": (0.1, float("inf"))}}, r"late: the delay of tau is \(0.1, inf\)"),
         ({"late": {"tau": (0.1, 0.2, 0.3)}}, "late: the delay of tau is"),
