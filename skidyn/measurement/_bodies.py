@@ -195,7 +195,7 @@ class TorqueScale(Check):
             yield self.suspicion(
                 "the description is that of a robot of another size",
                 f"torques are at another scale than those of its bodies ({told}), and with "
-                f"{other[0]:.3g} times its lengths, bodies of any mass explain them better by "
+                f"{other[0]:.2g} times its lengths, bodies of any mass explain them better by "
                 f"{other[1]:.0f} (log-likelihood), and better than gains do; use the description "
                 "of this robot",
                 "suspected",
