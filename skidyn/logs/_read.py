@@ -124,7 +124,8 @@ def read_log(
         ``{"tau": 0.04}``. Noise added after the filter, such as quantization in the file, is
         amplified by the factor by which the filter reduces noise.
     unwrap : bool, default=False
-        Remove jumps by a full turn from positions.
+        Remove jumps by a full turn from positions; recordings are moved by whole turns to be near
+        each other.
     torque_sign : {"recorded", "command"}, default="recorded"
         ``"command"``: torques that are never negative get the sign of commanded minus measured
         position.

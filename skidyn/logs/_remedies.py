@@ -371,16 +371,33 @@ def _sign_from_command(table: pd.DataFrame, n: int, notes: list[str]) -> None:
 
 
 def _unwrapped(table: pd.DataFrame, names: Sequence[str], notes: list[str]) -> pd.DataFrame:
+    """Positions without jumps by a full turn, within parts of the log and between them.
+
+    A wrapped position hides in which turn a part begins. All parts are moved by whole turns to be
+    near the one of the largest range, since the range of a joint is limited.
+    """
     time, number = table["time"].to_numpy(), table["trajectory"].to_numpy()
+    parts = find_segments(number, time)
     changed: dict[str, np.ndarray] = {}
+    moved = 0
     for name in names:
         q = table[name].to_numpy(dtype=float).copy()
-        for rows in find_segments(number, time):
+        for rows in parts:
             q[rows] = np.unwrap(q[rows])
-        if not np.array_equal(q, table[name]):
-            changed[name] = q
+        if np.array_equal(q, table[name]):
+            continue
+        low, high = (np.array([end(q[rows]) for rows in parts]) for end in (np.min, np.max))
+        middle, widest = (low + high) / 2, int(np.argmax(high - low))
+        turns = np.round((middle - middle[widest]) / (2 * np.pi))
+        for rows, turn in zip(parts, turns, strict=True):
+            q[rows] -= 2 * np.pi * turn
+        moved += int(np.count_nonzero(turns))
+        changed[name] = q
     told = ", ".join(changed) or "no position"
-    notes.append(f"unwrap: jumps by a full turn were removed from {told}")
+    apart = f"; {moved} of {len(changed) * len(parts)} parts were moved by whole turns" * bool(
+        moved
+    )
+    notes.append(f"unwrap: jumps by a full turn were removed from {told}{apart}")
     return table.assign(**changed)
 
 

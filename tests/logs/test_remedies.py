@@ -101,6 +101,18 @@ def test_delay_and_wrapped_positions_are_taken_out(read):
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
+def test_recordings_are_in_the_same_turn_after_unwrapping(read):
+    first = LOG["trajectory"].min()
+    apart = LOG.assign(q1=LOG["q1"] + np.where(LOG["trajectory"] == first, 0.5, -0.5))
+    middle = apart["q1"].median()
+    wrapped = apart.assign(q1=(apart["q1"] - middle) % (2 * np.pi))
+    mended = read(wrapped, unwrap=True)
+    turns = (mended["q1"] + middle - apart["q1"]) / 2 / np.pi
+    assert np.ptp(turns) < 1e-9
+    assert any("parts were moved by whole turns" in note for note in mended.attrs["notes"])
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
 def test_a_delay_that_grows_is_taken_out(read):
     late = LOG.copy()
     for _, run in LOG.groupby("trajectory"):
