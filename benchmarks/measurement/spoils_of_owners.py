@@ -223,6 +223,8 @@ def differential(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> S
         return None
     a, b = f"tau{n - 1}", f"tau{n}"
     changed = log.assign(**{a: (log[a] + log[b]) / 2, b: (log[a] - log[b]) / 2})
+    if robot.joint_types[n - 2] == robot.joint_types[n - 1] == "revolute":
+        return Spoiled(changed, robot, ("differential",), "--combine", (n - 1, n), ALSO)
     told = ("unexplained", "reading", "torque_scale", "crosstalk")
     return Spoiled(changed, robot, told, "", None, ALSO)
 

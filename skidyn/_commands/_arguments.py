@@ -151,6 +151,12 @@ def with_remedies(parser: Any) -> None:
         "motion=2,1,3",
     )
     fix.add_argument(
+        "--combine",
+        metavar="tau6=tau6+tau7,..",
+        help="replace columns by sums of recorded columns, as for the motors of a differential: "
+        "tau6=tau6+tau7,tau7=tau6-tau7",
+    )
+    fix.add_argument(
         "--gain", metavar="tau3=0.02", help="multiply columns or quantities by factors"
     )
     fix.add_argument(
@@ -163,7 +169,12 @@ def with_remedies(parser: Any) -> None:
         metavar="q2=1.57",
         help="recorded positions at the robot's zero; recorded velocities at rest: dq2=0.1",
     )
-    fix.add_argument("--late", metavar="tau=0.008", help="delays in s that are removed")
+    fix.add_argument(
+        "--late",
+        metavar="tau=0.008",
+        help="delays in s that are removed; 0.013+0.0005*t for one that grows with the time since "
+        "the beginning of a recording",
+    )
     fix.add_argument(
         "--lowpass",
         metavar="tau=0.04",

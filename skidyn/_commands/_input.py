@@ -113,6 +113,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         "resample_rate": said.get("resample"),
         "order": order_option(said.get("order")),
         "flip": listed(said.get("flip")),
+        "combine": pairs("combine", said.get("combine")),
         "summed": pairs("summed", said.get("summed")),
         **{name: pairs(name, said.get(name), numbers=True) for name in NUMBERS},
         **{name: said.get(name) for name in AS_GIVEN},
@@ -144,11 +145,18 @@ def pairs(name: str, text: str | None, numbers: bool = False) -> Any:
         if not equals or not key or not value:
             raise SkidynError(f"--{name} {text}: {word!r} is not NAME=VALUE")
         if numbers and key in said:  # successive checks may each find a part
-            both = number(name, value)
-            said[key] = said[key] * both if name == "gain" else said[key] + both
+            said[key] = _both(name, said[key], number(name, value))
         else:
             said[key] = number(name, value) if numbers else value
     return said
+
+
+def _both(name: str, one: Any, other: Any) -> Any:
+    """Two numbers of one remedy as one."""
+    if isinstance(one, tuple) or isinstance(other, tuple):  # a delay that grows
+        pairs = [x if isinstance(x, tuple) else (x, 0.0) for x in (one, other)]
+        return tuple(map(sum, zip(*pairs, strict=True)))
+    return one * other if name == "gain" else one + other
 
 
 def columns_option(text: str | None) -> Any:
@@ -179,11 +187,21 @@ def order_option(text: str | None) -> Any:
     return {q: joint_numbers(numbers) for q, numbers in zip(parts[1::2], parts[2::2], strict=True)}
 
 
-def number(name: str, text: str) -> float:
+#: A number, and a delay that grows with the time: 0.013+0.0005*t.
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_GROWING = re.compile(rf"({_NUMBER}(?=[+-]))?({_NUMBER})\*t")
+
+
+def number(name: str, text: str) -> Any:
+    """A number; a delay may grow with the time, and is two numbers then."""
+    hit = _GROWING.fullmatch(text.replace(" ", "")) if name == "late" else None
+    if hit:
+        return float(hit[1] or 0.0), float(hit[2])
     try:
         return float(text)
     except ValueError:
-        raise SkidynError(f"--{name}: {text!r} is not a number") from None
+        also = ", or one that grows such as 0.013+0.0005*t" if name == "late" else ""
+        raise SkidynError(f"--{name}: {text!r} is not a number{also}") from None
 
 
 def covered_joints(options: argparse.Namespace) -> list[str] | None:

@@ -143,7 +143,8 @@ RECORDED: dict[str, tuple[type, ...]] = {
     "nominal": (bool,),
     "rate": (float, int, type(None)),
     **dict.fromkeys(("columns", "units", "drive_gains", "joints", "effects"), (str, type(None))),
-    **dict.fromkeys(("gravity", "flip", "order", "gain", "summed"), (str, type(None))),
+    **dict.fromkeys(("gravity", "flip", "order", "combine", "gain"), (str, type(None))),
+    "summed": (str, type(None)),
     **dict.fromkeys(("zero", "late", "lowpass", "derive"), (str, type(None))),
     **dict.fromkeys(("torque_sign", "clock"), (str, type(None))),
     **dict.fromkeys(

@@ -44,10 +44,11 @@ def read_log(
     split_dwells: float | None = None,
     order: Sequence[int] | Mapping[str, Sequence[int]] | None = None,
     flip: Sequence[str | int] = (),
+    combine: Mapping[str, str] | None = None,
     gain: Mapping[str, float] | None = None,
     summed: Mapping[str, str] | None = None,
     zero: Mapping[str, float] | None = None,
-    late: Mapping[str, float] | None = None,
+    late: Mapping[str, float | tuple[float, float]] | None = None,
     lowpass: Mapping[str, float] | None = None,
     unwrap: bool = False,
     torque_sign: Literal["recorded", "command"] = "recorded",
@@ -101,6 +102,10 @@ def read_log(
     flip : sequence of str or int, default=()
         Signals whose sign is changed: a joint, by name or number, means its torque; ``"q3"`` its
         position with velocity and acceleration; ``"dq3"`` or ``"tau3"`` one column.
+    combine : mapping of str to str, optional
+        Sums of recorded columns that replace columns: ``{"tau6": "tau6+tau7", "tau7":
+        "tau6-tau7"}`` for the torques of the motors of a differential; terms may have factors,
+        ``"0.5*tau6-0.5*tau7"``.
     gain : mapping, optional
         Factors of columns or quantities: ``{"tau3": 0.02}``.
     summed : mapping of str to str, optional
@@ -110,14 +115,17 @@ def read_log(
     zero : mapping of str to float, optional
         Recorded positions at the robot's zero (rad or m), or velocities at rest, which are
         subtracted: ``{"q2": 1.5708}``.
-    late : mapping of str to float, s, optional
-        Delays of columns or quantities, which are removed: ``{"tau": 0.008}``.
+    late : mapping of str to float, s, or (float, float), s and s/s, optional
+        Delays of columns or quantities, which are removed: ``{"tau": 0.008}``; where clocks run at
+        different rates, the delay at the beginning of every recording and its growth: ``{"tau":
+        (0.013, 0.0005)}``.
     lowpass : mapping of str to float, s, optional
         Time constants of first-order low-pass filters of columns or quantities, which are undone:
         ``{"tau": 0.04}``. Noise added after the filter, such as quantization in the file, is
         amplified by the factor by which the filter reduces noise.
     unwrap : bool, default=False
-        Remove jumps by a full turn from positions.
+        Remove jumps by a full turn from positions; recordings are moved by whole turns to be near
+        each other.
     torque_sign : {"recorded", "command"}, default="recorded"
         ``"command"``: torques that are never negative get the sign of commanded minus measured
         position.
@@ -189,6 +197,7 @@ def read_log(
         Remedies(
             order=order,
             flip=flip,
+            combine=combine,
             gain=gain,
             summed=summed,
             zero=zero,

@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -26,6 +26,7 @@ BELOW = 0.01
 #: Beginning of the notes of remedies.
 REMEDIES = (
     "flip:",
+    "combine:",
     "gain:",
     "summed:",
     "zero:",
@@ -46,6 +47,7 @@ class Remedies:
 
     order: Sequence[int] | Mapping[str, Sequence[int]] | None = None
     flip: Sequence[str | int] = ()
+    combine: Mapping[str, str] | None = None
     gain: Mapping[str, float] | None = None
     summed: Mapping[str, str] | None = None
     zero: Mapping[str, float] | None = None
@@ -53,7 +55,7 @@ class Remedies:
     torque_sign: Literal["recorded", "command"] = "recorded"
     clock: Literal["recorded", "regular"] = "recorded"
     drop_repeated: bool = False
-    late: Mapping[str, float] | None = None
+    late: Mapping[str, float | tuple[float, float]] | None = None
     lowpass: Mapping[str, float] | None = None
     split_leaps: bool = False
     restore_gravity: bool = False
@@ -65,8 +67,9 @@ def mend_columns(
 ) -> pd.DataFrame:
     """Order, sign, scale, sums and zero of columns; what was done is appended to ``notes``.
 
-    A LogError is raised if a joint or column does not exist, an order is invalid, a gain is zero or
-    not finite, a position includes itself, or there are no commanded positions for the sign.
+    A LogError is raised if a joint or column does not exist, an order or a sum is invalid, a gain
+    is zero or not finite, a position includes itself, or there are no commanded positions for the
+    sign.
     """
     table = table.copy()
     if remedies.order is not None:
@@ -82,6 +85,8 @@ def mend_columns(
         for name in columns:
             table[name] = -table[name]
         notes.append(f"flip: the sign of {', '.join(columns)} was changed in {_all(table)} rows")
+    if remedies.combine:
+        _combine(table, remedies.combine, notes)
     for name, value in _each(remedies.gain, table, "gain"):
         if not np.isfinite(value) or value == 0:
             raise LogError(f"gain: {name} cannot be multiplied by {value}; expected a number.")
@@ -155,16 +160,15 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
         from skidyn.preprocessing import advance_channels  # needed only here; imports scikit-learn
 
         before = len(table)
-        for name, delay in _each(remedies.late, table, "late"):
-            if not np.isfinite(delay):
-                raise LogError(f"late: the delay of {name} is {delay:g}; expected seconds.")
-        table = advance_channels(table, dict(remedies.late))
+        delays = {name: _delay(name, value) for name, value in remedies.late.items()}
+        _each(dict.fromkeys(delays, 0.0), table, "late")  # their columns exist
+        table = advance_channels(table, delays)
         if table.empty:
             raise LogError(
                 f"late: no recording is longer than the delays {dict(remedies.late)} in s, so "
                 "that no row is left."
             )
-        told = ", ".join(f"{name} by {1e3 * v:g} ms" for name, v in remedies.late.items())
+        told = ", ".join(f"{name} by {_in_words(*both)}" for name, both in delays.items())
         notes.append(
             f"late: {told} removed; {before - len(table)} of {before} rows at the ends of "
             "continuous parts left out"
@@ -218,6 +222,35 @@ def _reorder(
         for numbers in map(list, dict.fromkeys(map(tuple, orders.values())))
     ]
     notes.append(f"order: {', '.join(said)}")
+
+
+#: One term of a sum of columns.
+_TERM = re.compile(r"([+-]?)(?:(\d+\.?\d*(?:e-?\d+)?|\.\d+)\*)?([A-Za-z_]\w*)")
+
+
+def _combine(table: pd.DataFrame, sums: Mapping[str, str], notes: list[str]) -> None:
+    """Sums of recorded columns in the place of columns, such as of the motors of a differential."""
+    recorded = table.copy()
+    for name, said in sums.items():
+        text = str(said).replace(" ", "")
+        terms = _TERM.findall(text)
+        unsigned = any(not sign for sign, _, _ in terms[1:])
+        if not terms or unsigned or "".join(_TERM.sub("", text).split()):
+            raise LogError(
+                f"combine: {name}={said} is not a sum of columns; expected for example "
+                "tau6=tau6+tau7, or tau6=0.5*tau6-0.5*tau7."
+            )
+        for column in (name, *(column for _, _, column in terms)):
+            if column not in recorded.columns or column in ("time", "trajectory"):
+                raise LogError(
+                    f"combine: {name}={said}: the log has no signal {column}; it has "
+                    f"{', '.join(map(str, recorded.columns))}."
+                )
+        table[name] = sum(
+            (-1.0 if sign == "-" else 1.0) * float(factor or 1.0) * recorded[column]
+            for sign, factor, column in terms
+        )
+        notes.append(f"combine: {name} was replaced by {text} in {_all(table)} rows")
 
 
 def _take_apart(table: pd.DataFrame, n: int, summed: Mapping[str, str], notes: list[str]) -> None:
@@ -275,6 +308,26 @@ def _each(
     return told
 
 
+def _delay(name: str, value: object) -> tuple[float, float]:
+    """Delay at the beginning of recordings, s, and its growth, s/s, of a number or two."""
+    parts: list[Any] = list(value) if isinstance(value, (tuple, list)) else [value, 0.0]
+    good = len(parts) == 2 and all(
+        isinstance(x, (int, float, np.number)) and np.isfinite(x) for x in parts
+    )
+    if not good or parts[1] <= -1:  # the clock would stand still, or run backwards
+        raise LogError(
+            f"late: the delay of {name} is {value}; expected seconds, such as 0.008, or seconds at "
+            "the beginning of a recording and their growth per second, such as (0.013, 0.0005), "
+            "which is 0.013+0.0005*t on the command line."
+        )
+    return float(parts[0]), float(parts[1])
+
+
+def _in_words(lag: float, growth: float) -> str:
+    """A delay with its growth."""
+    return f"{1e3 * lag:g} ms" + (f" and {1e3 * growth:g} ms more per second" if growth else "")
+
+
 def _with_derived(table: pd.DataFrame, asked: Sequence[str], notes: list[str]) -> pd.DataFrame:
     """Differentiated positions in the place of recorded velocities."""
     from skidyn.logs._clock import derive_velocity
@@ -318,16 +371,33 @@ def _sign_from_command(table: pd.DataFrame, n: int, notes: list[str]) -> None:
 
 
 def _unwrapped(table: pd.DataFrame, names: Sequence[str], notes: list[str]) -> pd.DataFrame:
+    """Positions without jumps by a full turn, within parts of the log and between them.
+
+    A wrapped position hides in which turn a part begins. All parts are moved by whole turns to be
+    near the one of the largest range, since the range of a joint is limited.
+    """
     time, number = table["time"].to_numpy(), table["trajectory"].to_numpy()
+    parts = find_segments(number, time)
     changed: dict[str, np.ndarray] = {}
+    moved = 0
     for name in names:
         q = table[name].to_numpy(dtype=float).copy()
-        for rows in find_segments(number, time):
+        for rows in parts:
             q[rows] = np.unwrap(q[rows])
-        if not np.array_equal(q, table[name]):
-            changed[name] = q
+        if np.array_equal(q, table[name]):
+            continue
+        low, high = (np.array([end(q[rows]) for rows in parts]) for end in (np.min, np.max))
+        middle, widest = (low + high) / 2, int(np.argmax(high - low))
+        turns = np.round((middle - middle[widest]) / (2 * np.pi))
+        for rows, turn in zip(parts, turns, strict=True):
+            q[rows] -= 2 * np.pi * turn
+        moved += int(np.count_nonzero(turns))
+        changed[name] = q
     told = ", ".join(changed) or "no position"
-    notes.append(f"unwrap: jumps by a full turn were removed from {told}")
+    apart = f"; {moved} of {len(changed) * len(parts)} parts were moved by whole turns" * bool(
+        moved
+    )
+    notes.append(f"unwrap: jumps by a full turn were removed from {told}{apart}")
     return table.assign(**changed)
 
 

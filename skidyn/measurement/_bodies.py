@@ -19,6 +19,7 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._peak import peak
 from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, MOST_ROWS
 from skidyn.measurement._robust import ROUNDS, fit_admissible
+from skidyn.measurement._size import find_size
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes, readable_fits
 
@@ -188,6 +189,19 @@ class TorqueScale(Check):
                 (f"--units tau={unit}", f"units={{'tau': '{unit}'}}"),
             )
             return
+        factors = _all_factors(fits, gains, typical)
+        other = find_size(fits, factors)
+        if other is not None:
+            yield self.suspicion(
+                "the description is that of a robot of another size",
+                f"torques are at another scale than those of its bodies ({told}), and with "
+                f"{other[0]:.2g} times its lengths, bodies of any mass explain them better by "
+                f"{other[1]:.0f} (log-likelihood), and better than gains do; use the description "
+                "of this robot",
+                "suspected",
+                sorted(gains),
+            )
+            return
         yield self.suspicion(
             "torques look like motor currents, motor torques or another unit",
             f"they follow the rigid-body torque at a different scale ({told}). The gains below "
@@ -195,7 +209,7 @@ class TorqueScale(Check):
             "drives instead (--drive-gains with i columns)",
             "suspected",
             sorted(gains),
-            _gain_remedy(_all_factors(fits, gains, typical)),
+            _gain_remedy(factors),
         )
 
     def _of_joints(

@@ -34,6 +34,7 @@ from skidyn.measurement._clock import (
 from skidyn.measurement._commanded import CommandedMotion
 from skidyn.measurement._copies import CopiedTorque, RepeatedRecordings
 from skidyn.measurement._crosstalk import Crosstalk
+from skidyn.measurement._differential import MotorsOfDifferential
 from skidyn.measurement._divided import DividedRecordings
 from skidyn.measurement._elapsed import LostRows
 from skidyn.measurement._held import HeldPosition, HeldTorque, MissingTorque, StuckTorque
@@ -73,6 +74,7 @@ CHECKS: tuple[Check, ...] = (
     Axes(),
     DividedRecordings(),
     OddRecording(),
+    MotorsOfDifferential(),
     Columns(),
     TorqueScale(),
     NoFriction(),
@@ -115,7 +117,7 @@ def list_checks() -> tuple[Check, ...]:
     --------
     >>> from skidyn.measurement import list_checks
     >>> [check.name for check in list_checks() if check.stage == 1]
-    ['axes', 'divided_recordings', 'odd_recording', 'reading']
+    ['axes', 'divided_recordings', 'odd_recording', 'differential', 'reading']
     """
     return CHECKS
 

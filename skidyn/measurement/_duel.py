@@ -17,9 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._signals import Array
 from skidyn.effects import Effect, get_effect, searched_kinds
 from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._near_bodies import LOOSE, POWERS, ExtraColumns, Factored, NearBodies
+from skidyn.robots import Robot
 
 #: Mass of a payload, as a share of the robot's, and its distance in m (one standard deviation).
 CARRIED, AWAY = 0.1, 0.2
@@ -134,6 +136,12 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[fl
     return scaled[0], min(scaled), min(left)
 
 
+def likely_load(robot: Robot) -> Array:
+    """Standard deviations of the ten parameters of a payload, of which nothing else is known."""
+    masses = np.asarray(robot.inertial_parameters, dtype=float).reshape(-1, 10)[:, 0]
+    return np.asarray(CARRIED * float(masses.sum()) * AWAY**POWERS)
+
+
 def _effects() -> Iterator[Effect]:
     """Effects of the catalogue that depend only on the present motion."""
     for kind in searched_kinds():
@@ -183,8 +191,7 @@ def _shapes(
     signals, fits = bodies.signals, bodies.fits
     robot = signals.robot if effect.kind == "payload" else None  # it is only another body
     if robot is not None:
-        masses = np.asarray(robot.inertial_parameters, dtype=float).reshape(-1, 10)[:, 0]
-        known = CARRIED * float(masses.sum()) * AWAY**POWERS
+        known = likely_load(robot)
     for site in effect.sites(signals):
         if not set(site) & set(joints):
             continue

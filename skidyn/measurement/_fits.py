@@ -272,13 +272,15 @@ class Fits:
         column = column if reading.order is None else reading.order[column]
         return column, -1.0 if joint in reading.flip_torque else 1.0
 
-    def torque_at(self, lag: float) -> Array:
-        """Torque that was recorded a lag (s) after the motion of every sample."""
+    def torque_at(self, lag: float | Array) -> Array:
+        """Torque that was recorded a lag (s) after the motion of every sample, or lags of them."""
         source = self.recorded
         later = np.empty((len(source.picked), self.n_joints))
+        lags = np.broadcast_to(lag, len(later))
         for rows in source.segments:
             own = (source.picked >= rows.start) & (source.picked < rows.stop)
-            at, clock = source.clock[source.picked[own]] + lag, source.clock[rows]
+            at = source.clock[source.picked[own]] + lags[own]
+            clock = source.clock[rows]
             for k in range(self.n_joints):
                 later[own, k] = np.interp(at, clock, source.torque[rows, k])
         return later

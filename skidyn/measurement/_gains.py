@@ -3,7 +3,7 @@
 
 The ratio of a torque to that of the stated bodies gives its scale with the relative error of these
 bodies. Joints that move the same bodies determine relative scales far better, so bodies near the
-description and scales are found together.
+description and scales are found together, with a load that may differ from recording to recording.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._delay import FEW_RUNS, MOST_RUNS
+from skidyn.measurement._duel import likely_load
+from skidyn.measurement._fits import SAMPLES, Fits, Reading
 from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies
 
 #: Most steps, the largest one, and the one that ends them.
@@ -87,21 +89,25 @@ def refined_scales(fits: Fits, gains: Mapping[int, float], free: Mapping[int, fl
     near = NearBodies(fits, Reading(), np.ones(fits.n_joints), inflation)
     torques = [fits.mean_torque(k)[0][use] for k, use in zip(near.joints, near.rows, strict=True)]
     stated = [y - target for y, target in zip(torques, near.targets, strict=True)]
-    precision = np.full(len(joints), KNOWN_TO**-2)
+    loads, n_loads = _loads(fits, near)
+    precision = np.append(np.ones(n_loads), np.full(len(joints), KNOWN_TO**-2))
     errors = np.full(len(joints), KNOWN_TO)
     for _ in range(STEPS if joints else 0):
         near.targets = [
             y / now[k] - x for k, y, x in zip(near.joints, torques, stated, strict=True)
         ]
-        plain = near.fit_to(SHARE)
+        known = ExtraColumns(loads, (), precision[:n_loads]) if n_loads else None
+        plain = near.fit_to(SHARE, known).coefficients
         columns: dict[int, Array] = {}
         for j, d, p, x, use in zip(
             near.joints, near.designs, near.places, stated, near.rows, strict=True
         ):
+            own = np.zeros((fits.n_rows, len(joints)))
             if j in joints:  # what bodies make, and not friction, that is free in any case
                 bodies = p < near.n_bodies
-                columns[j] = np.zeros((fits.n_rows, len(joints)))
-                columns[j][use, joints.index(j)] = x + d[:, bodies] @ plain.coefficients[p[bodies]]
+                own[use, joints.index(j)] = x + d[:, bodies] @ plain[p[bodies]]
+                own[use, joints.index(j)] += loads[j][use] @ plain[len(plain) - n_loads :]
+            columns[j] = np.hstack([loads[j], own])
         found = near.fit_to(SHARE, ExtraColumns(columns, (), precision))
         change = found.coefficients[-len(joints) :]
         spread = Factored(found.gram).solve(np.eye(len(found.gram))[:, -len(joints) :])
@@ -114,11 +120,33 @@ def refined_scales(fits: Fits, gains: Mapping[int, float], free: Mapping[int, fl
         mean = 1 / np.diag(cov) / np.sum(1 / np.diag(cov))
         against = np.eye(len(joints)) - mean
         errors = np.sqrt(np.maximum(np.diag(against @ cov @ against.T), 0.0))
-        now[joints] *= np.median([free[k] / now[k] for k in joints])
-    known = dict(zip(joints, errors.tolist(), strict=True))
-    return Scales(
-        {k: float(now[k]) for k in free}, {k: float(known.get(k, KNOWN_TO)) for k in free}
-    )
+        now[joints] *= _middle(np.array([free[k] / now[k] for k in joints]), errors**-2)
+    sure = dict(zip(joints, errors.tolist(), strict=True))
+    return Scales({k: float(now[k]) for k in free}, {k: float(sure.get(k, KNOWN_TO)) for k in free})
+
+
+def _middle(values: Array, weights: Array) -> float:
+    """Weighted median: the scale of a joint that is hardly known counts little."""
+    order = np.argsort(values)
+    share = np.cumsum(weights[order]) / weights.sum()
+    return float(values[order][np.searchsorted(share, 0.5)])
+
+
+def _loads(fits: Fits, near: NearBodies) -> tuple[dict[int, Array], int]:
+    """Columns of a load on the last body that differs from recording to recording, by joint.
+
+    A payload of one recording would otherwise be scales of the joints that carry it.
+    """
+    run_of = fits.signals.trajectory[::SAMPLES]
+    runs = np.unique(run_of)
+    runs = runs[1:] if FEW_RUNS < len(runs) <= MOST_RUNS else runs[:0]
+    if not len(runs):
+        return {j: np.zeros((fits.n_rows, 0)) for j in near.joints}, 0
+    size = likely_load(fits.robot)
+    last = np.arange(near.n_bodies - len(size), near.n_bodies)
+    load = fits.mean_regressor(fits.robot, fits.motion(Reading()), last) * size
+    columns = np.concatenate([load * (run_of == run)[:, None, None] for run in runs], axis=2)
+    return {j: columns[:, j] for j in near.joints}, columns.shape[2]
 
 
 def _rounded(factor: float, error: float) -> float:

@@ -67,7 +67,7 @@ class Measurement:
         have an even clock.
     unsigned, changes, delay, copies, servos, late_position, readable, stale, lost, odd : optional
         Results of checks that are used by other checks; set by them.
-    scaled, smoothed, computed, frictionless : bool, optional
+    scaled, smoothed, computed, frictionless, mixed : bool, optional
         Results of checks that are used by other checks; set by them.
     clock : float, optional
         Number of units of the clock in a second; set by its check.
@@ -105,6 +105,7 @@ class Measurement:
     smoothed: bool = field(default=False, repr=False)
     computed: bool = field(default=False, repr=False)
     frictionless: bool = field(default=False, repr=False)
+    mixed: bool = field(default=False, repr=False)
     clock: float = field(default=1.0, repr=False)
     millimetres: set[int] = field(default_factory=set, repr=False)
     #: Rows to which positions jump; trajectories end before them.

@@ -13,6 +13,7 @@ from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._delay import Delay, RunDelay, find_delay, refined_lag
+from skidyn.measurement._drift import Drift, find_drift
 from skidyn.measurement._fits import Fits, Reading, friction
 from skidyn.measurement._late_motion import LateMotion, find_late_motion
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
@@ -217,8 +218,8 @@ class Columns(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         fits = measurement.fits
-        if fits is None or measurement.odd:
-            return  # contradictory recordings have no common reading
+        if fits is None or measurement.odd or measurement.mixed:
+            return  # contradictory recordings, and mixed torques, have no common reading
         changes = asked_changes(measurement, fits)
         orders = [change for change in changes if change.kind in ORDERS]
         for kind in dict.fromkeys(change.kind for change in changes):
@@ -407,20 +408,9 @@ class TorqueDelay(Check):
             return
         if measurement.stale or measurement.computed or measurement.smoothed:
             return  # held and interpolated values are always late or early
-        drift = found.late - found.early
-        if (
-            abs(drift) > max(SMALLEST, DRIFTING * found.drift_error)
-            and found.gain > LEAST
-            and _all_drift(found, drift)
-        ):
-            yield self.suspicion(
-                "the clock of the torque runs at a different rate than that of the motion",
-                f"torque is late by {1e3 * found.early:.1f} ms in the first half of the "
-                f"recordings and by {1e3 * found.late:.1f} ms in the second (standard error of "
-                f"the difference {1e3 * found.drift_error:.1f} ms); stamp both with one clock, or "
-                "cut the recordings into short ones and correct the delay of each",
-                "suspected",
-            )
+        drift = _drift(measurement, fits, found)
+        if drift is not None or _drifts(found):
+            yield self._drifting(found, drift)
             return
         odd = late_runs(found)
         for run, one in odd.items():
@@ -485,6 +475,27 @@ class TorqueDelay(Check):
             )
             return
         yield from self._of_joints(measurement, fits, found)
+
+    def _drifting(self, found: Delay, drift: Drift | None) -> Suspicion:
+        """Clocks with different rates."""
+        fitted, remedy = "", None
+        if drift is not None:
+            fitted = (
+                f"; a lag of {1e3 * drift.lag:.1f} ms at the beginning of every recording and "
+                f"{1e3 * drift.growth:.3g} ms more per second explain it better than a constant "
+                f"one by {drift.gain:.0f} (log-likelihood)"
+            )
+            both = (drift.lag, drift.growth)
+            remedy = (f"--late tau={drift.option}", f"late={{'tau': {both}}}")
+        return self.suspicion(
+            "the clock of the torque runs at a different rate than that of the motion",
+            f"torque is late by {1e3 * found.early:.1f} ms in the first half of the "
+            f"recordings and by {1e3 * found.late:.1f} ms in the second (standard error of "
+            f"the difference {1e3 * found.drift_error:.1f} ms){fitted}; if possible, stamp both "
+            "with one clock",
+            "suspected",
+            remedy=remedy,
+        )
 
     def _of_joints(self, measurement: Measurement, fits: Fits, found: Delay) -> Iterator[Suspicion]:
         """Torques of single joints that are late or early."""
@@ -591,6 +602,27 @@ def _whole(measurement: Measurement, lag: float) -> float:
         if abs(samples - np.round(samples)) < near
         else lag
     )
+
+
+def _drifts(found: Delay) -> bool:
+    """Whether the lag is different in the halves of the recordings."""
+    drift = found.late - found.early
+    known = abs(drift) > max(SMALLEST, DRIFTING * found.drift_error)
+    return bool(known and found.gain > LEAST and _all_drift(found, drift))
+
+
+def _drift(measurement: Measurement, fits: Fits, found: Delay) -> Drift | None:
+    """Lag that grows with time, on more than a single joint; None if there is none.
+
+    Where positions jump, trajectories were cut that a file does not separate.
+    """
+    if not abs(found.late - found.early) > _least_lag(measurement) or len(measurement.leaps):
+        return None
+    drift = find_drift(fits, found)
+    if drift is None or drift.gain < SURE:
+        return None
+    most = max(drift.gains) if len(drift.gains) > 1 else 0.0
+    return drift if drift.gain - most > (1 - AGREEING) * drift.gain else None
 
 
 def _all_drift(found: Delay, drift: float) -> bool:

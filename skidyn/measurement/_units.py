@@ -12,6 +12,7 @@ from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._measurement import ALIKE, Measurement
+from skidyn.measurement._readings import FEWEST_ROWS, MOST_ROWS
 from skidyn.measurement._suspicion import Suspicion
 
 DEGREE = np.pi / 180
@@ -240,7 +241,8 @@ class PositionUnit(Check):
         else:
             joints = None
         ratio = _fitted_size(measurement, float((largest / limits)[turning].max()), joints)
-        if ratio is not None and not (degrees and _like_degrees(measurement, ratio, joints)):
+        gained = _gained_over_degrees(measurement, ratio, joints) if ratio else 0.0
+        if ratio is not None and (not degrees or gained >= DECISIVE):
             value = float(f"{1 / ratio:.4g}")
             moving = dict.fromkeys(both, value)
             words = ",".join(f"{name}={size:g}" for name, size in moving.items())
@@ -251,6 +253,15 @@ class PositionUnit(Check):
                 "certain",
                 np.flatnonzero(outside),
                 (f"--gain {words}", f"gain={moving}"),
+            )
+        elif degrees and joints is not None and ratio is not None and gained > LEAST:
+            yield self.suspicion(
+                "positions are in degrees, or those of the motors before the gears",
+                f"{seen}; divided by about {ratio:.3g} they explain the torque better by "
+                f"{gained:.0f} (log-likelihood) than as degrees, which is not decisive; use the "
+                "ratio of the gears, if it is known (--gain)",
+                "certain",
+                np.flatnonzero(outside),
             )
         elif degrees:
             certain = bool((outside & known).any()) or usual > 25
@@ -333,6 +344,10 @@ def _fitted_size(
     if fits is None or least < DISTANT:
         return None
     sizes = 0.8 * least * 1.03 ** np.arange(90)  # up to a tenth of the range of the joint
+    if joints is not None:  # bodies that other joints move as well
+        few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+        alike = [float(few.identified(_sized(x, joints)).likelihood.sum()) for x in sizes]
+        return _sharpened(fits, float(sizes[int(np.argmax(alike))]), joints)
     likely = np.array([fits.nominal(_sized(x, joints), 2).likelihood.sum() for x in sizes])
     best = int(np.argmax(likely))
     far = np.abs(np.arange(len(sizes)) - best) > 4
@@ -346,17 +361,18 @@ def _fitted_size(
     return _sharpened(fits, float(finer[int(np.argmax(likely))]), joints)
 
 
-def _like_degrees(measurement: Measurement, ratio: float, joints: frozenset[int] | None) -> bool:
-    """Whether positions may be degrees, although another factor fits better.
+def _gained_over_degrees(
+    measurement: Measurement, ratio: float, joints: frozenset[int] | None
+) -> float:
+    """Log-likelihood with bodies of any mass that a factor of positions gains over degrees.
 
-    A usual unit is likelier than a gear before which position was measured, unless bodies of any
-    mass decide.
+    A usual unit is likelier than a gear before which position was measured, unless this decides.
     """
     fits = measurement.fits
     if abs(ratio * DEGREE - 1) < 0.06 or fits is None:
-        return True
+        return 0.0
     there, degrees = (fits.identified(_sized(x, joints)) for x in (ratio, 1 / DEGREE))
-    return float(there.margin(degrees).sum()) < DECISIVE
+    return float(there.margin(degrees).sum())
 
 
 def _sized(size: float, joints: frozenset[int] | None) -> Reading:

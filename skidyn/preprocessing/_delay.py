@@ -182,16 +182,19 @@ def _peak(sums: Array) -> tuple[float, float]:
     return float(k - reach + 0.5 * (left - right) / bend), float(values[k])
 
 
-def advance_channels(frame: pd.DataFrame, delays: Mapping[str, float]) -> pd.DataFrame:
+def advance_channels(
+    frame: pd.DataFrame, delays: Mapping[str, float | tuple[float, float]]
+) -> pd.DataFrame:
     """Remove delays from a log.
 
     Parameters
     ----------
     frame : DataFrame
         A log with ``time`` (s) and, for several trajectories, ``trajectory``.
-    delays : mapping of str to float, s
+    delays : mapping of str to float, s, or (float, float), s and s/s
         Delay of a column (``"tau3"``) or of a quantity (``"tau"``: all its joints); positive if it
-        is late.
+        is late. Two numbers are the delay at the beginning of every trajectory and its growth, for
+        a clock that runs at a different rate.
 
     Returns
     -------
@@ -211,22 +214,29 @@ def advance_channels(frame: pd.DataFrame, delays: Mapping[str, float]) -> pd.Dat
     >>> log = pd.DataFrame({"time": [0.0, 1, 2, 3], "q1": [0.0, 1, 2, 3], "tau1": [9.0, 0, 1, 2]})
     >>> advance_channels(log, {"tau": 1.0})["tau1"].tolist()
     [0.0, 1.0, 2.0]
+    >>> advance_channels(log, {"q": (0.0, 0.5)})["q1"].tolist()
+    [0.0, 1.5, 3.0]
     """
-    shifts: dict[str, float] = {}
+    shifts: dict[str, tuple[float, float]] = {}
     for name, delay in delays.items():
         joints = [c for c in frame.columns if str(c).rstrip("0123456789") == name != c]
         if name not in frame.columns and not joints:
             raise ValueError(f"the log has no {name}; it has {', '.join(map(str, frame.columns))}.")
-        shifts |= dict.fromkeys([name] if name in frame.columns else joints, float(delay))
+        lag, growth = delay if isinstance(delay, (tuple, list)) else (delay, 0.0)
+        both = float(lag), float(growth)
+        shifts |= dict.fromkeys([name] if name in frame.columns else joints, both)
     time = frame["time"].to_numpy(dtype=float)
     runs: Any = frame["trajectory"].to_numpy() if "trajectory" in frame else np.zeros(len(frame))
     columns = {name: frame[name].to_numpy(dtype=float, copy=True) for name in shifts}
     keep = np.ones(len(frame), dtype=bool)
+    begin: dict[Any, float] = {}  # of a trajectory, which may have several segments
     for rows in find_segments(runs, time):
         own = time[rows]
-        for name, delay in shifts.items():
-            columns[name][rows] = _read_at(own, columns[name][rows], own + delay)
-            keep[rows] &= (own + delay >= own[0]) & (own + delay <= own[-1])
+        since = own - begin.setdefault(runs[rows.start], own[0])
+        for name, (lag, growth) in shifts.items():
+            later = own + lag + growth * since
+            columns[name][rows] = _read_at(own, columns[name][rows], later)
+            keep[rows] &= (later >= own[0]) & (later <= own[-1])
     return frame.assign(**columns)[keep].reset_index(drop=True)
 
 

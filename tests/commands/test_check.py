@@ -55,6 +55,9 @@ def test_the_command_that_fixes_a_log_keeps_its_options(tmp_path, capsys):
         (["--flip", "elbow"], "flip: 'elbow' is neither"),
         (["--zero", "q1"], "'q1' is not NAME=VALUE"),
         (["--gain", "tau1=much"], "'much' is not a number"),
+        (["--late", "tau=0.01+much*t"], "or one that grows such as 0.013+0.0005*t"),
+        (["--combine", "tau1=tau1+volts"], "the log has no signal volts"),
+        (["--gain", "tau1=0.01*t"], "'0.01*t' is not a number"),
         (["--order", "tau=1"], "is not an order of 2 joints"),
         (["--order", "2,1,tau=2,1"], "'2,1' belongs to no quantity"),
         (["--lowpass", "tau=-1"], "expected a signal and the positive time constant"),
@@ -70,6 +73,15 @@ def test_what_one_check_after_another_found_is_taken_together(flipped, capsys):
     assert main(["check", flipped, "--order", "q=1,2,tau=1,2", *words]) == 0
     told = capsys.readouterr()
     assert "gain: tau1 was multiplied by 1 in" in told.out + told.err
+
+
+@pytest.mark.parametrize(
+    "text", ["tau=0.01+5e-4*t", "tau=0.01,tau=0.0005*t", '{"tau": [0.01, 5e-4]}']
+)
+def test_a_delay_may_grow_with_the_time(text, flipped, capsys):
+    assert main(["check", flipped, "--late", text]) == 0
+    told = capsys.readouterr()
+    assert "late: tau by 10 ms and 0.5 ms more per second removed" in told.out + told.err
 
 
 def test_gravity_of_another_length_than_three_is_refused(flipped, capsys):

@@ -101,6 +101,43 @@ def test_delay_and_wrapped_positions_are_taken_out(read):
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
+def test_recordings_are_in_the_same_turn_after_unwrapping(read):
+    first = LOG["trajectory"].min()
+    apart = LOG.assign(q1=LOG["q1"] + np.where(LOG["trajectory"] == first, 0.5, -0.5))
+    middle = apart["q1"].median()
+    wrapped = apart.assign(q1=(apart["q1"] - middle) % (2 * np.pi))
+    mended = read(wrapped, unwrap=True)
+    turns = (mended["q1"] + middle - apart["q1"]) / 2 / np.pi
+    assert np.ptp(turns) < 1e-9
+    assert any("parts were moved by whole turns" in note for note in mended.attrs["notes"])
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_delay_that_grows_is_taken_out(read):
+    late = LOG.copy()
+    for _, run in LOG.groupby("trajectory"):
+        at = (run["time"] - 0.01) - 0.005 * (run["time"] - run["time"].iloc[0])
+        late.loc[run.index, "tau1"] = np.interp(at, run["time"], run["tau1"])
+    mended = read(late, late={"tau1": (0.01, 0.005)})
+    same = LOG.merge(mended, on=["time", "trajectory"], suffixes=("", "_mended"))
+    left, before = same["tau1"] - same["tau1_mended"], LOG["tau1"] - late["tau1"]
+    assert left.std() < 0.2 * before.std()
+    told = "late: tau1 by 10 ms and 5 ms more per second removed; "
+    assert any(note.startswith(told) for note in mended.attrs["notes"])
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_sums_are_those_of_recorded_columns(read):
+    mended = read(
+        LOG, combine={"tau1": "tau1 + tau2", "tau2": "-0.5*tau1-2*tau2"}, gain={"tau2": 3}
+    )
+    np.testing.assert_allclose(mended["tau1"], LOG["tau1"] + LOG["tau2"])
+    np.testing.assert_allclose(mended["tau2"], -1.5 * LOG["tau1"] - 6 * LOG["tau2"])
+    told = f"combine: tau1 was replaced by tau1+tau2 in {len(LOG)} of {len(LOG)} rows"
+    assert told in mended.attrs["notes"]
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
 def test_a_low_pass_is_undone_within_recordings(read):
     filtered = LOG.copy()
     for rows in LOG.groupby("trajectory").indices.values():
@@ -145,7 +182,18 @@ def test_sign_from_the_command(read):
         ({"zero": {"q1": float("nan")}}, "zero: q1 has the value nan"),
         ({"late": {"volts": 0.1}}, "late: the log has no volts"),
         ({"late": {"tau": 100.0}}, "late: no recording is longer than"),
-        ({"late": {"tau": float("nan")}}, "late: the delay of tau1 is nan"),
+        ({"combine": {"tau1": "tau1+volts"}}, "the log has no signal volts"),
+        ({"combine": {"tau9": "tau1+tau2"}}, "the log has no signal tau9"),
+        ({"combine": {"tau1": "tau1*tau2"}}, "is not a sum of columns"),
+        ({"combine": {"tau1": "tau1tau2+"}}, "is not a sum of columns"),
+        ({"combine": {"tau1": "2"}}, "is not a sum of columns"),
+        ({"combine": {"tau1": ""}}, "is not a sum of columns"),
+        ({"combine": {"time": "tau1"}}, "the log has no signal time"),
+        ({"late": {"tau": float("nan")}}, "late: the delay of tau is nan"),
+        ({"late": {"tau": (0.1, float("inf"))}}, r"late: the delay of tau is \(0.1, inf\)"),
+        ({"late": {"tau": (0.1, 0.2, 0.3)}}, "late: the delay of tau is"),
+        ({"late": {"tau": (0.1, -1.0)}}, "and their growth per second"),
+        ({"late": {"tau": "0.1*t"}}, "late: the delay of tau is 0.1"),
         ({"lowpass": {"volts": 0.1}}, "lowpass: the log has no volts"),
         ({"lowpass": {"tau": 0.0}}, "lowpass: got tau1 and 0 s"),
         ({"lowpass": {"time": 0.1}}, "lowpass: got time and"),

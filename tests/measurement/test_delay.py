@@ -42,7 +42,8 @@ def test_clocks_of_other_rates():
     (told,) = late(lambda since: 0.005 * since)
     what = "the clock of the torque runs at a different rate than that of the motion"
     assert told.suspicion == what
-    assert told.remedy is None
+    assert told.remedy.option.startswith("--late tau=") and told.remedy.option.endswith("*t")
+    assert told.remedy.code.startswith("late={'tau': (")
 
 
 def test_one_recording_that_is_late():

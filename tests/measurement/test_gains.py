@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 
 
@@ -36,3 +36,10 @@ def test_one_gear_ratio_for_all_is_one_factor(log):
 
 def test_a_single_factor_is_the_round_number_near_by(log):
     assert remedied(log, {2: 0.25}) == {2: 0.25}
+
+
+def test_a_payload_of_some_recordings_does_not_change_relative_scales():
+    arm = load_planar_arm()
+    log = make_hidden_effect_log(arm, "payload", n_trajectories=4, duration=4.0, random_state=4)
+    found = remedied(log, {1: 20.0, 2: 35.0})
+    assert found[1] / 20 == pytest.approx(found[2] / 35, rel=0.02)

@@ -68,3 +68,16 @@ def test_a_slider_in_millimetres():
     told = {s.check: s for s in checks}["position_unit"]
     assert told.remedy.option == "--gain q3=0.001,dq3=0.001"
     assert told.certainty == "certain" and told.joints == (3,)
+
+
+@pytest.mark.parametrize("joint", [1, 2])
+def test_angle_of_a_motor_on_one_joint(joint, short, told_of, only):
+    names = [f"q{joint}", f"dq{joint}"]
+    told = told_of(short.assign(**{name: 120 * short[name] for name in names}))
+    words = ",".join(f"{name}=0.008333" for name in names)
+    only(told.values(), "position_unit", "certain", f"--gain {words}")
+
+
+def test_degrees_of_one_joint(short, told_of, only):
+    told = told_of(short.assign(**{name: np.rad2deg(short[name]) for name in ("q2", "dq2")}))
+    only(told.values(), "position_unit", "certain", "--units q2=deg,dq2=deg/s")

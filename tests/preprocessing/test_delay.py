@@ -46,6 +46,15 @@ def test_delay_is_taken_out(log):
     assert len(advance_channels(log, {"tau": -0.01})) == len(log) - 3 * 3
 
 
+def test_delay_that_grows_is_counted_from_the_beginning_of_every_trajectory(log):
+    mended = advance_channels(log, {"q1": (0.0, 0.01)})
+    for run, rows in mended.groupby("trajectory"):
+        own = log[log["trajectory"] == run]
+        since = rows["time"] - own["time"].iloc[0]
+        expected = np.interp(rows["time"] + 0.01 * since, own["time"], own["q1"])
+        np.testing.assert_allclose(rows["q1"], expected, atol=1e-3 * own["q1"].abs().max())
+
+
 def test_messages(log):
     with pytest.raises(ValueError, match="constant signal"):
         estimate_delay(log["q1"], 0 * log["q1"], rate=250.0)
