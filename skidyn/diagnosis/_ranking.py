@@ -26,7 +26,7 @@ from skidyn.diagnosis._hypothesis import (
 )
 from skidyn.diagnosis._parts import part_candidates
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
-from skidyn.diagnosis._recordings import choose
+from skidyn.diagnosis._recordings import choose, own_friction
 from skidyn.diagnosis._rule import (
     MASKED,
     RESOLVED,
@@ -270,7 +270,8 @@ class RankingSearch(SearchState):
             return refine(self.problem, self.blocks, [candidate], self.sigma, self.target)[0]
 
         tester, least = self.tester(self.chosen), self.settings.least_gain
-        found = part_candidates(self.pool, tester, self.significant, refined, least)
+        pool = [*self.pool, *own_friction(self.problem, self.kinds)]
+        found = part_candidates(pool, tester, self.significant, refined, least)
         return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
 
     def _each_by_itself(self, candidate: Candidate) -> list[Candidate]:

@@ -71,6 +71,25 @@ def recording_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
     return candidates
 
 
+def own_friction(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
+    """Friction that the given model contains, which may differ in a part of the recordings.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    kinds : iterable of str
+        Kinds to try.
+    """
+    tried = set(kinds)
+    return [
+        Candidate(term.kind, term, problem.term_rows(term))
+        for term in problem.terms
+        if term.kind in tried and term.effect.by_recording and term.effect.comes_and_goes
+        if term.effect.drawn_against == "dq" and not term.is_open
+    ]
+
+
 def choose(
     candidates: Sequence[Candidate],
     tester_beside: Callable[[Sequence[Candidate]], Tester],
