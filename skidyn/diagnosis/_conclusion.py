@@ -16,6 +16,7 @@ from skidyn._text import joints_told, listed
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._confidence import confidence, mostly_stays
+from skidyn.diagnosis._constancy import changes
 from skidyn.diagnosis._correction import is_physics, refitted_errors
 from skidyn.diagnosis._episodes import (
     Episode,
@@ -43,6 +44,7 @@ from skidyn.diagnosis._remainder import (
 )
 from skidyn.diagnosis._result import Diagnosis, Verdict
 from skidyn.diagnosis._rule import (
+    CHANGE_SHARE,
     EPISODE_LEAST_HELD,
     EPISODE_LEAST_NOISE,
     EPISODE_LEAST_RANGE,
@@ -149,6 +151,8 @@ def conclude(
     ends = np.array(history[0]["rmse"]), rmse
     whole = problem.whole_trajectories
     scores = {h.kind: h.score for h in result.findings}
+    changed = changes(problem, result)
+    findings = [replace(f, change=changed.get(f.kind, 0.0)) for f in findings]
     findings = [
         _sure(f, findings, parts, ends, whole, f.margin * scores.get(f.kind, np.inf))
         for f in findings
@@ -520,6 +524,7 @@ def _sure(
         in_some=finding.trajectories is not None,
         few=finding.trajectories is not None and all(t.effect.by_recording for t in finding.terms),
         stays=finding.kind != UNKNOWN and mostly_stays(before, after, alike * parts.noise[same]),
+        changes=finding.change > CHANGE_SHARE,
         has_name=finding.kind != UNKNOWN,
     )
     # Only one of several equivalent pairs of joints is right.

@@ -71,6 +71,10 @@ class Finding:
     elsewhere : tuple of tuple of int
         Other pairs of joints, counted from 1, on which the same effect explains the data equally
         well.
+    change : float
+        Squared error that the effect, or the friction of its joints, would remove in addition if it
+        changed over the log or with the motion, as a share of what it removes; 0 if no change is
+        significant.
 
     Examples
     --------
@@ -98,6 +102,7 @@ class Finding:
     curves: list[dict[str, Any]] = field(default_factory=list, repr=False)
     alike: bool = False
     elsewhere: tuple[tuple[int, ...], ...] = ()
+    change: float = 0.0
 
     def _repr_html_(self) -> str:
         from skidyn.diagnosis._notebook import finding_card
@@ -124,6 +129,7 @@ class Finding:
             "elsewhere": [list(joints) for joints in self.elsewhere],
             "margin": self.margin,
             "confidence": self.confidence,
+            "change": self.change,
             "trajectories": None if self.trajectories is None else list(self.trajectories),
             "when": [episode.to_dict() for episode in self.when],
             "sentence": self.sentence,

@@ -270,7 +270,8 @@ class RankingSearch(SearchState):
             return refine(self.problem, self.blocks, [candidate], self.sigma, self.target)[0]
 
         tester, least = self.tester(self.chosen), self.settings.least_gain
-        pool = [*self.pool, *own_friction(self.problem, self.kinds)]
+        pool = [c for c in self.pool if c.term.effect.comes_and_goes and not some_recordings(c)]
+        pool += own_friction(self.problem, self.kinds)
         found = part_candidates(pool, tester, self.significant, refined, least)
         return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
 

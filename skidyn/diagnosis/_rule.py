@@ -75,6 +75,11 @@ GUESS = 0.5
 #: (``confidence.py``).
 LITTLE, SURE_OF_LITTLE = 0.005, 0.9
 
+# Whether an effect is the same throughout the log (``_constancy.py``); ``confidence.py``.
+#: Level of all tests of a diagnosis together, number of parts of the recordings, and share of what
+#: an effect explains above which its change is material: formulas are not exact.
+CHANGE_LEVEL, CHANGE_PARTS, CHANGE_SHARE = 0.001, 8, 0.01
+
 # Intermittent torques (``_episodes.py``); no false one: ``nothing_hidden.py``.
 #: Squared residual, in units of the noise, above which a row counts as excess, and the least sum of
 #: the excess of an episode: several successive rows far above quiet ones.

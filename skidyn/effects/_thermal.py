@@ -103,7 +103,8 @@ class FrictionDrift(Effect):
     A gear warms up quickly at first and then ever more slowly: friction is a parabola of a warm-up
     that approaches its end with a time constant. The first two coefficients are the change from the
     start of the log to its end. They are the only ones for friction that changed at once, as after
-    a repair or when a seal slips; its shape contains the time ``since`` which it has changed.
+    a repair or when a seal slips; its shape contains the time ``since`` which it has changed, or
+    ``level`` if it has another level in some recordings.
     """
 
     kind = "friction_drift"
@@ -145,7 +146,8 @@ class FrictionDrift(Effect):
         return gradual + [{"since": t} for t in moments(signals, _CHANGES) if len(starts(signals))]
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
-        return self.coefficients[:2] if "since" in shape else self.coefficients
+        at_once = {"since", "level"} & set(shape)
+        return self.coefficients[:2] if at_once else self.coefficients
 
     def meaning(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         if "since" not in parameters:
@@ -155,6 +157,8 @@ class FrictionDrift(Effect):
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         dq = signals.dq[:, joint]
         sign = signals.sign[:, joint]
+        if "level" in shape:
+            return np.column_stack([dq, sign])
         if "since" in shape:
             later = (signals.clock >= shape["since"]).astype(float)
             return np.column_stack([later * dq, later * sign])

@@ -30,3 +30,11 @@ def test_friction_that_changed_at_once(signals):
     np.testing.assert_allclose(columns[:, 0], later * signals.dq[:, 0])
     np.testing.assert_allclose(columns[:, 1], later * signals.sign[:, 0])
     assert columns.shape[1] == 2
+
+
+def test_friction_of_another_level_has_no_moment(signals):
+    effect = get_effect("friction_drift")
+    columns = effect.columns(signals, 0, level=1.0)
+    np.testing.assert_allclose(columns, np.column_stack([signals.dq[:, 0], signals.sign[:, 0]]))
+    assert effect.meaning({}) == ""
+    assert "3 s" in effect.meaning({"since": {"value": 3.0, "unit": "s"}})
