@@ -20,6 +20,7 @@ from skidyn.diagnosis._constancy import changes
 from skidyn.diagnosis._correction import is_physics, refitted_errors
 from skidyn.diagnosis._episodes import (
     Episode,
+    acting,
     away_from_reversals,
     find_episodes,
 )
@@ -132,6 +133,7 @@ def conclude(
             own = [u for u in unknowns if hypothesis.kind == UNKNOWN and u.joint in joints]
             q = false_discovery_rate(chance, hypothesis.tried)
             finding = make_finding(problem, hypothesis, candidate, others, q, drop, intervals, own)
+            finding.when.extend(acting(problem, candidate.term, own_torque))
             curves = effect_curves(problem, finding.terms, own_torque, residual)
             finding.curves.extend(curves)
             findings.append(finding)
