@@ -30,6 +30,15 @@ def _warmth(signals: Signals, joint: int, levels_over: float = np.inf) -> Array:
     return -levels_over * np.expm1(-warm / levels_over) if np.isfinite(levels_over) else warm
 
 
+def _lasts(signals: Signals, since: float) -> bool:
+    """Whether two recordings or more show a change, after one that shows the state before it.
+
+    A single one may differ for many reasons.
+    """
+    begun = starts(signals)
+    return bool(len(begun) and signals.clock.min() < since < begun[-1])
+
+
 def _constant_temperature(signals: Signals, joint: int) -> str | None:
     if signals.temperature is not None and np.ptp(signals.temperature[:, joint]) < 0.5:
         return f"the temperature of joint {joint + 1} changes by less than 0.5 degrees"
@@ -143,7 +152,10 @@ class FrictionDrift(Effect):
         constants = np.clip(span * np.array(shape.grid), shape.low, shape.high)
         start = float(clock.min())
         gradual = [{"time_constant": float(c), "t0": start, "span": span} for c in constants]
-        return gradual + [{"since": t} for t in moments(signals, _CHANGES) if len(starts(signals))]
+        return gradual + [{"since": t} for t in moments(signals, _CHANGES) if _lasts(signals, t)]
+
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        return "since" not in shape or _lasts(signals, shape["since"])
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
         at_once = {"since", "level"} & set(shape)

@@ -38,3 +38,11 @@ def test_friction_of_another_level_has_no_moment(signals):
     np.testing.assert_allclose(columns, np.column_stack([signals.dq[:, 0], signals.sign[:, 0]]))
     assert effect.meaning({}) == ""
     assert "3 s" in effect.meaning({"since": {"value": 3.0, "unit": "s"}})
+
+
+def test_a_change_in_the_last_recording_alone_is_not_tried(signals):
+    effect = get_effect("friction_drift")
+    moments = [shape["since"] for shape in effect.grid(signals, (0,)) if "since" in shape]
+    assert moments
+    assert max(moments) < 3.0  # where the last of two begins
+    assert not effect.admissible(signals, (0,), {"since": 3.0})
