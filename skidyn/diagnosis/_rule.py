@@ -77,8 +77,9 @@ LITTLE, SURE_OF_LITTLE = 0.005, 0.9
 
 # Whether an effect is the same throughout the log (``_constancy.py``); ``confidence.py``.
 #: Level of all tests of a diagnosis together, number of parts of the recordings, and share of what
-#: an effect explains above which its change is material: formulas are not exact.
-CHANGE_LEVEL, CHANGE_PARTS, CHANGE_SHARE = 0.001, 8, 0.01
+#: an effect explains above which its change is material, as ``Settings.further_tolerance``: the
+#: formula is not exact, and the change is one of several that are tested.
+CHANGE_LEVEL, CHANGE_PARTS, CHANGE_SHARE = 0.001, 8, 0.0075
 
 # Effects that begin or end within recordings (``_spans.py``); ``nothing_hidden.py``.
 #: Rounds in which coefficients and times are determined in turn, and least number of recordings in
