@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm
-from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis import Candidate
 from skidyn.diagnosis._constancy import changes
 from skidyn.diagnosis._hypothesis import Hypothesis, SearchResult
 from skidyn.diagnosis._rule import CHANGE_SHARE
