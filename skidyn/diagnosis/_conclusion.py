@@ -505,10 +505,10 @@ def _sure(
     """The finding with the probability that it is identified correctly."""
     if not finding.terms:
         return finding
-    joints = [j - 1 for j in finding.joints]
+    joints = _reached(finding)
     others = [f for f in findings if f is not finding and f.kind == UNKNOWN]
-    beside = any(set(f.joints) & set(finding.joints) for f in others)
-    same = sorted({j - 1 for f in findings if f.kind == finding.kind for j in f.joints})
+    beside = any({j - 1 for j in f.joints} & set(joints) for f in others)
+    same = sorted({j for f in findings if f.kind == finding.kind for j in _reached(f)})
     before, after = (error[same] for error in errors)
     # Noise that is correlated in time is larger than its fast part, and similar on all joints; a
     # single joint does not show this.
@@ -531,6 +531,11 @@ def _sure(
     )
     # Only one of several equivalent pairs of joints is right.
     return replace(finding, confidence=probability / (1 + len(finding.elsewhere)))
+
+
+def _reached(finding: Finding) -> list[int]:
+    """Joints, from 0, with the torque of an effect: a payload on the last link reaches all."""
+    return sorted({j for term in finding.terms for j in term.places})
 
 
 def _episodic(
