@@ -131,7 +131,8 @@ class JudgingSearch(RankingSearch):
             # An effect that differs between recordings is one finding per joint; a function of
             # signals is not, and may act on joints that it does not explain.
             joints = sorted({j for c in covered for j in c.joints}) if single else list(best.joints)
-            width = sum(c.width for c in covered)
+            # the choice of a part of the recordings counts as parameters, too
+            width = best.n_parameters if in_part(best) else sum(c.width for c in covered)
             enough = (
                 rival.n_parameters <= width if single else bool(set(joints) & set(rival.joints))
             )

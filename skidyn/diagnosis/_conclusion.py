@@ -16,9 +16,11 @@ from skidyn._text import joints_told, listed
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._confidence import confidence, mostly_stays
+from skidyn.diagnosis._constancy import changes
 from skidyn.diagnosis._correction import is_physics, refitted_errors
 from skidyn.diagnosis._episodes import (
     Episode,
+    acting,
     away_from_reversals,
     find_episodes,
 )
@@ -43,6 +45,7 @@ from skidyn.diagnosis._remainder import (
 )
 from skidyn.diagnosis._result import Diagnosis, Verdict
 from skidyn.diagnosis._rule import (
+    CHANGE_SHARE,
     EPISODE_LEAST_HELD,
     EPISODE_LEAST_NOISE,
     EPISODE_LEAST_RANGE,
@@ -130,6 +133,7 @@ def conclude(
             own = [u for u in unknowns if hypothesis.kind == UNKNOWN and u.joint in joints]
             q = false_discovery_rate(chance, hypothesis.tried)
             finding = make_finding(problem, hypothesis, candidate, others, q, drop, intervals, own)
+            finding.when.extend(acting(problem, candidate.term, own_torque))
             curves = effect_curves(problem, finding.terms, own_torque, residual)
             finding.curves.extend(curves)
             findings.append(finding)
@@ -149,6 +153,8 @@ def conclude(
     ends = np.array(history[0]["rmse"]), rmse
     whole = problem.whole_trajectories
     scores = {h.kind: h.score for h in result.findings}
+    changed = changes(problem, result)
+    findings = [replace(f, change=changed.get(f.kind, 0.0)) for f in findings]
     findings = [
         _sure(f, findings, parts, ends, whole, f.margin * scores.get(f.kind, np.inf))
         for f in findings
@@ -499,10 +505,10 @@ def _sure(
     """The finding with the probability that it is identified correctly."""
     if not finding.terms:
         return finding
-    joints = [j - 1 for j in finding.joints]
+    joints = _reached(finding)
     others = [f for f in findings if f is not finding and f.kind == UNKNOWN]
-    beside = any(set(f.joints) & set(finding.joints) for f in others)
-    same = sorted({j - 1 for f in findings if f.kind == finding.kind for j in f.joints})
+    beside = any({j - 1 for j in f.joints} & set(joints) for f in others)
+    same = sorted({j for f in findings if f.kind == finding.kind for j in _reached(f)})
     before, after = (error[same] for error in errors)
     # Noise that is correlated in time is larger than its fast part, and similar on all joints; a
     # single joint does not show this.
@@ -520,10 +526,16 @@ def _sure(
         in_some=finding.trajectories is not None,
         few=finding.trajectories is not None and all(t.effect.by_recording for t in finding.terms),
         stays=finding.kind != UNKNOWN and mostly_stays(before, after, alike * parts.noise[same]),
+        changes=finding.change > CHANGE_SHARE,
         has_name=finding.kind != UNKNOWN,
     )
     # Only one of several equivalent pairs of joints is right.
     return replace(finding, confidence=probability / (1 + len(finding.elsewhere)))
+
+
+def _reached(finding: Finding) -> list[int]:
+    """Joints, from 0, with the torque of an effect: a payload on the last link reaches all."""
+    return sorted({j for term in finding.terms for j in term.places})
 
 
 def _episodic(

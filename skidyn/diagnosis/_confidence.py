@@ -28,6 +28,9 @@ FEW = -0.6
 #: Weight of an error that mostly remains on the joint where it was largest: more than this share of
 #: the part above the noise, and this multiple of the noise. A third of such effects are right.
 STAYS, MOSTLY, ABOVE_NOISE = -2.2, 0.6, 1.2
+#: Weight of an effect that would explain materially more if it changed over the log or with the
+#: motion (``_constancy.py``).
+CHANGES = -2.2
 #: Weight of a suspicion about the signals of its joints, which would be another explanation.
 DOUBTED = -1.5
 #: Margins between which another explanation of the same joints is equally good or better; one that
@@ -41,8 +44,8 @@ SEPARATES = 6.0
 COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: Highest confidence that the number of logs used for the weights permits.
 MOST = 0.98
-#: Highest confidence of an unknown effect, which may be a known one with another formula, and of an
-#: effect that leaves most of the error.
+#: Highest confidence of an unknown effect, which may be a known one with another formula, of an
+#: effect that changes, and of one that leaves most of the error.
 MOST_NAMELESS = 0.88
 
 
@@ -59,6 +62,7 @@ def confidence(
     in_some: bool = False,
     few: bool = False,
     stays: bool = False,
+    changes: bool = False,
     has_name: bool = True,
 ) -> float:
     """Probability that an effect is identified correctly.
@@ -87,23 +91,26 @@ def confidence(
         Whether it acts in few recordings only, and other forms of it were not tried there.
     stays : bool, default=False
         Whether most of the error above the noise remains on its joints (:func:`mostly_stays`).
+    changes : bool, default=False
+        Whether it, or the friction of its joints, changes over the log or with the motion.
     has_name : bool, default=True
         Whether it is a known effect.
 
     Returns
     -------
     float
-        Between 0 and 0.98, or 0.88 for an unknown effect or if most of the error remains.
+        Between 0 and 0.98, or 0.88 for an unknown effect, for one that changes, or if most of the
+        error remains.
     """
     # Where all known effects leave most of the error, the best of them need not be right.
     logit = CONSTANT + (0.0 if stays else MARGIN * min(max(margin, 0.0), 1.0))
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
     logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
-    logit += STAYS * stays + FEW * few + ALIKE * alike
+    logit += STAYS * stays + FEW * few + ALIKE * alike + CHANGES * changes
     equal = EQUAL_IN_SOME if in_some else EQUAL
     logit += EQUALLED * (rivalled and -ABOVE < margin and (margin < equal or lead < SEPARATES))
-    most = MOST if has_name and not stays else MOST_NAMELESS
+    most = MOST if has_name and not stays and not changes else MOST_NAMELESS
     return min(most, float(1 / (1 + np.exp(-logit))))
 
 

@@ -9,7 +9,7 @@ then the next, until the sum is that of noise.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +28,7 @@ from skidyn.diagnosis._rule import (
     EPISODE_QUIET,
     EPISODE_SLIDING,
 )
+from skidyn.effects import Term
 from skidyn.evidence import Problem
 
 
@@ -119,6 +120,32 @@ def find_episodes(
         numbers = tuple(j + 1 for j in joints)
         episodes.append(Episode(trajectory, start, end, numbers, size, link, force))
     return episodes, inside
+
+
+def acting(
+    problem: Problem, term: Term, torque: Mapping[Term, Mapping[int, Array]]
+) -> list[Episode]:
+    """Intervals of an effect that begins or ends within recordings.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    term : Term
+        The effect.
+    torque : mapping of Term to mapping of int to ndarray of shape (n_samples,)
+        Torque of every effect at every sample, by joint, N m or N.
+    """
+    signals, episodes = problem.signals, []
+    for name, start, end in term.spans:
+        inside = (signals.trajectory == name) & (signals.clock >= start) & (signals.clock <= end)
+        own = {j: float(np.sqrt(np.mean(x[inside] ** 2))) for j, x in torque[term].items()}
+        joints, size = tuple(j + 1 for j in own), tuple(own.values())
+        time = signals.clock[inside]
+        episodes.append(
+            Episode(name, float(time.min()), float(time.max()), joints, size, None, None)
+        )
+    return episodes
 
 
 def away_from_reversals(

@@ -63,7 +63,8 @@ class Finding:
     trajectories : tuple of int or None
         Recordings with the effect; None if all have it.
     when : list of Episode
-        Intervals of time of an intermittent torque.
+        Intervals of time of an intermittent torque, and of an effect that begins or ends within
+        recordings, in these.
     curves : list of dict
         Effect and partial residual against its main signal, for each joint.
     alike : bool
@@ -71,6 +72,10 @@ class Finding:
     elsewhere : tuple of tuple of int
         Other pairs of joints, counted from 1, on which the same effect explains the data equally
         well.
+    change : float
+        Squared error that the effect, or the friction of its joints, would remove in addition if it
+        changed over the log or with the motion, as a share of what it removes; 0 if no change is
+        significant.
 
     Examples
     --------
@@ -98,6 +103,7 @@ class Finding:
     curves: list[dict[str, Any]] = field(default_factory=list, repr=False)
     alike: bool = False
     elsewhere: tuple[tuple[int, ...], ...] = ()
+    change: float = 0.0
 
     def _repr_html_(self) -> str:
         from skidyn.diagnosis._notebook import finding_card
@@ -124,6 +130,7 @@ class Finding:
             "elsewhere": [list(joints) for joints in self.elsewhere],
             "margin": self.margin,
             "confidence": self.confidence,
+            "change": self.change,
             "trajectories": None if self.trajectories is None else list(self.trajectories),
             "when": [episode.to_dict() for episode in self.when],
             "sentence": self.sentence,
@@ -187,6 +194,7 @@ def make_finding(
     else:
         code = f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'
     sentence = f"{told_briefly(title, joints, term.trajectories, parameters)}. "
+    sentence += _spans_told(term)
     sentence += _fall_told(error_drop)
     if rivals:
         sentence += (
@@ -282,6 +290,18 @@ def _stem(name: str) -> str:
     """Name of the vector of which a parameter is a component, else its own."""
     stem, _, axis = name.rpartition("_")
     return stem if axis in ("x", "y", "z") else name
+
+
+def _spans_told(term: Term) -> str:
+    """Times at which an effect begins or ends within recordings."""
+    if not term.spans:
+        return ""
+    times = [
+        f"from {start:.1f} to {end:.1f} s of trajectory {name}"
+        for name, start, end in term.spans[:4]
+    ]
+    more = len(term.spans) - 4
+    return f"It acts {listed([*times, f'in part of {more} more'] if more > 0 else times)}. "
 
 
 def _fall_told(drop: float) -> str:

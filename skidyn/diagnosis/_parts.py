@@ -249,7 +249,7 @@ def part_candidates(
     Parameters
     ----------
     pool : sequence of Candidate
-        Effects that may be missing, in all recordings.
+        Effects that may be missing in a part, in all recordings.
     tester : Tester
         Tests given the present model.
     significant : callable
@@ -263,8 +263,7 @@ def part_candidates(
     if len(scan.names) < FEWEST:
         return []
     sites: dict[tuple[_Form, tuple[int, ...]], list[tuple[float, Candidate]]] = defaultdict(list)
-    passing = [c for c in pool if c.term.effect.comes_and_goes and c.term.trajectories is None]
-    for rough, candidate in zip(scan.roughly(passing).tolist(), passing, strict=True):
+    for rough, candidate in zip(scan.roughly(pool).tolist(), pool, strict=True):
         if rough > least:
             form = candidate.kind, candidate.term.effect.form_names & set(candidate.term.shape)
             sites[form, candidate.joints].append((rough, candidate))

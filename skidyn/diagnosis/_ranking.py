@@ -26,7 +26,7 @@ from skidyn.diagnosis._hypothesis import (
 )
 from skidyn.diagnosis._parts import part_candidates
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
-from skidyn.diagnosis._recordings import choose
+from skidyn.diagnosis._recordings import choose, own_friction
 from skidyn.diagnosis._rule import (
     MASKED,
     RESOLVED,
@@ -35,6 +35,7 @@ from skidyn.diagnosis._rule import (
 )
 from skidyn.diagnosis._screen import Model, Screen
 from skidyn.diagnosis._search_state import SearchState
+from skidyn.diagnosis._spans import span_candidates
 from skidyn.diagnosis._spectrum import Line, find_lines, find_vibrations
 from skidyn.diagnosis._split import recordings_with, split_effects
 from skidyn.effects import get_effect
@@ -53,15 +54,16 @@ class RankingSearch(SearchState):
     def rank(self) -> list[Hypothesis]:
         """Explanations of the residual, best first."""
         screening, recordings = self._screening(), self._by_kind_of_recording()
-        once = [self._lines, self._splits, self._parts]
+        once = [self._lines, self._splits, self._parts, self._spans]
         looks: list[Callable[[], Any]] = [*once, *screening, *recordings]
         text = f"{self._round}: screening effects"
-        lines, splits, parts, *found = each(lambda look: look(), looks, text)
+        lines, splits, parts, spans, *found = each(lambda look: look(), looks, text)
         rough = sorted(self._found(found[: len(screening)]) + splits, key=lambda item: item[1])
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
         ranking += [self._against_functions(h, ranking) for h in lines]
         ranking += self._finals([own for of_kind in found[len(screening) :] for own in of_kind])
         ranking += self._finals(parts, refined=0)  # their shapes are refined already
+        ranking += self._finals(spans, refined=0)
         ranking += self._other_forms(ranking)
         # The least specific explanations are last: differences between recordings, and vibration.
         return sorted(
@@ -270,7 +272,15 @@ class RankingSearch(SearchState):
             return refine(self.problem, self.blocks, [candidate], self.sigma, self.target)[0]
 
         tester, least = self.tester(self.chosen), self.settings.least_gain
-        found = part_candidates(self.pool, tester, self.significant, refined, least)
+        pool = [c for c in self.pool if c.term.effect.comes_and_goes and not some_recordings(c)]
+        pool += own_friction(self.problem, self.kinds)
+        found = part_candidates(pool, tester, self.significant, refined, least)
+        return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
+
+    def _spans(self) -> list[list[Candidate]]:
+        """Effects that begin or end within recordings, those that may be possible."""
+        tester, least = self.tester(self.chosen), self.settings.least_gain
+        found = span_candidates(self.problem, self.kinds, tester, self.significant, least)
         return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
 
     def _each_by_itself(self, candidate: Candidate) -> list[Candidate]:

@@ -20,6 +20,8 @@ from skidyn.evidence import Problem
 TESTED = 8
 #: Most terms of one kind.
 MOST_TERMS = 24
+#: Kinds of friction that may change together, and the kind of such a change.
+FRICTION, DRIFT = ("viscous", "coulomb"), "friction_drift"
 #: Share of the whole gain from which a single recording is treated alone.
 MOSTLY = 0.8
 
@@ -69,6 +71,32 @@ def recording_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
                 term = Term.at(kind, joints, {"trajectories": group})
                 candidates.append(Candidate(kind, term, rows_within(problem, whole, group)))
     return candidates
+
+
+def own_friction(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
+    """Friction that the given model contains, which may differ in a part of the recordings.
+
+    Each kind by itself, and those of a joint together as friction of another level.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    kinds : iterable of str
+        Kinds to try.
+    """
+    tried = set(kinds)
+    own = {(t.kind, t.places): t for t in problem.terms if t.kind in FRICTION}
+    terms = [t for t in own.values() if t.kind in tried and not t.is_open]
+    if DRIFT in tried:
+        effect = get_effect(DRIFT)
+        terms += [
+            Term.at(DRIFT, (j,), {"level": 1.0})
+            for j in range(problem.n_joints)
+            if all((kind, (j,)) in own for kind in FRICTION)
+            and effect.not_shown(problem.few, j) is None
+        ]
+    return [Candidate(term.kind, term, problem.term_rows(term)) for term in terms]
 
 
 def choose(

@@ -75,6 +75,17 @@ GUESS = 0.5
 #: (``confidence.py``).
 LITTLE, SURE_OF_LITTLE = 0.005, 0.9
 
+# Whether an effect is the same throughout the log (``_constancy.py``); ``confidence.py``.
+#: Level of all tests of a diagnosis together, number of parts of the recordings, and share of what
+#: an effect explains above which its change is material, as ``Settings.further_tolerance``: the
+#: formula is not exact, and the change is one of several that are tested.
+CHANGE_LEVEL, CHANGE_PARTS, CHANGE_SHARE = 0.001, 8, 0.0075
+
+# Effects that begin or end within recordings (``_spans.py``); ``nothing_hidden.py``.
+#: Rounds in which coefficients and times are determined in turn, and least number of recordings in
+#: which an effect must begin or end: a single one does not show that it returns.
+SPAN_ROUNDS, LEAST_SPANS = 8, 2
+
 # Intermittent torques (``_episodes.py``); no false one: ``nothing_hidden.py``.
 #: Squared residual, in units of the noise, above which a row counts as excess, and the least sum of
 #: the excess of an episode: several successive rows far above quiet ones.
@@ -428,6 +439,18 @@ class Tester:
         columns, left = [part[:, 1:] for part in parts], [part[:, 0] for part in parts]
         alone = self._test(own, columns, left, significant)
         return replace(test, chance=max(test.chance, alone.chance))
+
+    def estimate(self, rows: dict[int, Array]) -> tuple[Array, float]:
+        """Coefficients of some columns, and the squared error that they remove.
+
+        Parameters
+        ----------
+        rows : dict of int to ndarray of shape (n_rows_j, n_coefficients)
+            Averaged columns, per joint they reach.
+        """
+        scaled = self._scaled(rows)
+        least = self._least(scaled, *self._mimic(scaled))
+        return least.coefficients, least.drop
 
     def test_each(
         self, rows: dict[int, Array], significant: Callable[[float], bool]

@@ -285,6 +285,7 @@ class SearchState:
         count = sum((c.term.effect.leading or c.width) + c.n_shapes for c in candidates)
         if any("trajectories" in c.term.shape for c in candidates):
             count += len(np.unique(self.problem.signals.trajectory)) // 2
+        count += 2 * sum(len(c.term.spans) for c in candidates)
         return count
 
 

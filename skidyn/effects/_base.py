@@ -68,8 +68,9 @@ class Shape:
         ``scales`` is True.
     low, high : float
         Range of the refined value.
-    spacing : {"log", "linear"}
-        Spacing of the refinement: by factors or by differences.
+    spacing : {"log", "linear", "samples"}
+        Spacing of the refinement: by factors, by differences, or by samples of the log for a
+        moment in time.
     scales : bool
         Whether the value is an angle or angular velocity, so that it scales for sliders.
     has_interval : bool
@@ -89,7 +90,7 @@ class Shape:
     grid: tuple[float, ...]
     low: float
     high: float
-    spacing: Literal["log", "linear"] = "log"
+    spacing: Literal["log", "linear", "samples"] = "log"
     scales: bool = True
     has_interval: bool = True
     limit_kind: str = ""
@@ -544,7 +545,7 @@ class Effect:
             Physical parameters by name.
         """
         values: dict[str, Any] = {
-            c.name: float(v) for c, v in zip(self.coefficients, coefficients, strict=True)
+            c.name: float(v) for c, v in zip(self.coefficients_of(shape), coefficients, strict=True)
         }
         return values | dict(shape)
 

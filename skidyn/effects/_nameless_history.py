@@ -13,6 +13,7 @@ from numpy.polynomial.legendre import legvander
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Shape
 from skidyn.effects._hysteresis import dahl_state, stop_along, strokes_of
+from skidyn.effects._moments import moments
 from skidyn.effects._nameless import (
     NamelessEffect,
     splines,
@@ -93,14 +94,12 @@ class SuddenOffset(NamelessEffect):
     title = "Torque with an onset in time"
     formula = r"\tau_0\,[t \geq t_0]"
     coefficients = unnamed_coefficients(1)
-    shapes = (Shape("moment", "s", (), -np.inf, np.inf, spacing="linear", scales=False),)
+    shapes = (Shape("moment", "s", (), -np.inf, np.inf, spacing="samples", scales=False),)
     depends_on = ("time",)
     needs = ("time",)
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        order = np.sort(signals.clock)
-        places = np.linspace(0, len(order), _MOMENTS + 2)[1:-1].astype(int)
-        return [{"moment": float(moment)} for moment in np.unique(order[places])]
+        return [{"moment": moment} for moment in moments(signals, _MOMENTS)]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         since = float(np.mean(signals.clock >= shape["moment"]))
@@ -109,10 +108,6 @@ class SuddenOffset(NamelessEffect):
 
     def words(self, shape: Mapping[str, Any]) -> str:
         return f"Torque with an onset at {shape['moment']:.6g} s"
-
-    def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        # a recording's length: moments between recordings are equivalent
-        return float(np.median([np.ptp(signals.clock[rows]) for rows in signals.segments]))
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         return np.asarray(signals.clock >= shape["moment"], dtype=float)[:, None]

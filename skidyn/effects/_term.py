@@ -112,8 +112,16 @@ class Term:
         return self.shape.get("trajectories")
 
     @property
+    def spans(self) -> tuple[tuple[int, float, float], ...]:
+        """Trajectories in which the effect acts for some time only, with its start and end in s.
+
+        ``spans`` in the shape lists them, in addition to ``trajectories``.
+        """
+        return self.shape.get("spans", ())
+
+    @property
     def _own_shape(self) -> dict[str, Any]:
-        return {k: v for k, v in self.shape.items() if k != "trajectories"}
+        return {k: v for k, v in self.shape.items() if k not in ("trajectories", "spans")}
 
     @property
     def everywhere(self) -> Term:
@@ -228,8 +236,11 @@ class Term:
         columns = self.effect.torque_columns(signals, self.places, **self._own_shape)
         if self.trajectories is None:
             return columns
-        here = np.isin(signals.trajectory, self.trajectories)[:, None]
-        return {j: np.where(here, block, 0.0) for j, block in columns.items()}
+        here = np.isin(signals.trajectory, self.trajectories)
+        for name, start, end in self.spans:
+            time = signals.clock
+            here &= (signals.trajectory != name) | ((time >= start) & (time <= end))
+        return {j: np.where(here[:, None], block, 0.0) for j, block in columns.items()}
 
     def parameters(self, coefficients: Array, signals: Signals | None = None) -> dict[str, Any]:
         """Physical parameters from fitted coefficients.

@@ -3,20 +3,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
+from skidyn.effects._moments import moments, starts
 
 #: Temperature at which the derivatives are stated, in degrees Celsius.
 REFERENCE_TEMPERATURE = 30.0
 _BITTENCOURT = "Bittencourt, Wernholt, Sander-Tavallaey, Brogardh (2010), IROS, 4548-4554."
 
 
-#: Number of recordings, spread over a log, from which friction may have changed.
+#: Number of moments, spread over a log, from which friction may have changed.
 _CHANGES = 16
 #: Temperature ranges over which the dependence on temperature levels off, K.
 _LEVELLING = ({"levels_over": 6.0}, {"levels_over": 15.0})
@@ -27,6 +28,15 @@ def _warmth(signals: Signals, joint: int, levels_over: float = np.inf) -> Array:
     assert signals.temperature is not None
     warm = signals.temperature[:, joint] - REFERENCE_TEMPERATURE
     return -levels_over * np.expm1(-warm / levels_over) if np.isfinite(levels_over) else warm
+
+
+def _lasts(signals: Signals, since: float) -> bool:
+    """Whether two recordings or more show a change, after one that shows the state before it.
+
+    A single one may differ for many reasons.
+    """
+    begun = starts(signals)
+    return bool(len(begun) and signals.clock.min() < since < begun[-1])
 
 
 def _constant_temperature(signals: Signals, joint: int) -> str | None:
@@ -101,8 +111,9 @@ class FrictionDrift(Effect):
 
     A gear warms up quickly at first and then ever more slowly: friction is a parabola of a warm-up
     that approaches its end with a time constant. The first two coefficients are the change from the
-    start of the log to its end. For friction that changed at once, as after a repair or when a seal
-    slips, the shape contains the time ``since`` which it has changed.
+    start of the log to its end. They are the only ones for friction that changed at once, as after
+    a repair or when a seal slips; its shape contains the time ``since`` which it has changed, or
+    ``level`` if it has another level in some recordings.
     """
 
     kind = "friction_drift"
@@ -121,6 +132,9 @@ class FrictionDrift(Effect):
     )
     shapes = (
         Shape("time_constant", "s", (0.2, 0.6, 3.0), 1.0, 1e6, scales=False, has_interval=False),
+        Shape(
+            "since", "s", (), -np.inf, np.inf, spacing="samples", scales=False, has_interval=False
+        ),
     )
     forms = ({"since": 0.0},)
     needs = ("time",)
@@ -134,20 +148,32 @@ class FrictionDrift(Effect):
         # is predicted on the same time axis.
         clock = signals.clock
         span = max(float(np.ptp(clock)), 1e-9)
-        (shape,) = self.shapes  # its grid: shares of the span
+        shape = self.shapes[0]  # its grid: shares of the span
         constants = np.clip(span * np.array(shape.grid), shape.low, shape.high)
         start = float(clock.min())
         gradual = [{"time_constant": float(c), "t0": start, "span": span} for c in constants]
-        begun = np.sort([clock[rows.start] for rows in signals.segments])[1:]
-        few = begun[:: max(1, len(begun) // _CHANGES + 1)]
-        return gradual + [{"since": float(t)} for t in few]
+        return gradual + [{"since": t} for t in moments(signals, _CHANGES) if _lasts(signals, t)]
+
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        return "since" not in shape or _lasts(signals, shape["since"])
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        at_once = {"since", "level"} & set(shape)
+        return self.coefficients[:2] if at_once else self.coefficients
+
+    def meaning(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
+        if "since" not in parameters:
+            return ""
+        return f"The friction changed at once, at {parameters['since']['value']:.6g} s."
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         dq = signals.dq[:, joint]
         sign = signals.sign[:, joint]
+        if "level" in shape:
+            return np.column_stack([dq, sign])
         if "since" in shape:
             later = (signals.clock >= shape["since"]).astype(float)
-            return np.column_stack([later * dq, later * sign, 0 * dq, 0 * dq])
+            return np.column_stack([later * dq, later * sign])
         since, time_constant = signals.clock - shape["t0"], shape["time_constant"]
         # Before the log began, it has the value of its start.
         risen = np.where(

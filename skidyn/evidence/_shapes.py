@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.effects import Shape, Term, get_effect
+from skidyn.effects import Shape, Term, get_effect, starts
 from skidyn.evidence._folds import RIDGE, Normal, column_sizes
 from skidyn.evidence._problem import Problem
 
@@ -17,6 +18,8 @@ FIRST_STEP, SHRINK, ROUNDS = 0.5, 2.2, 7
 FIRST_SHARE = 0.06
 #: Trials of a simplex for each parameter at most, and its size in first steps when it stops.
 MOST_TRIALS, CLOSE = 40, 0.01
+#: Share of the recordings, and of the samples of one, that is the first step of a moment.
+COARSE = 8
 #: Squared error, in units of the noise, that a term must remove; less does not determine values.
 LEAST_FURTHER = 4.0
 
@@ -109,6 +112,14 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
     values = [float(term.shape[s.name]) for s in shapes]
     best = gain(problem.term_rows(term), term.lowest)
     for i, (shape, (_, _, step)) in enumerate(zip(shapes, ranges, strict=True)):
+        if shape.spacing == "samples":
+            sides = values[:i], values[i + 1 :]
+
+            def gain_since(moment: float, sides: tuple[Any, Any] = sides) -> float:
+                return gain_of([*sides[0], moment, *sides[1]])
+
+            values[i], best = _moment(problem, values[i], best, gain_since)
+            continue
         for _ in range(ROUNDS):
             improved = False
             for way in (1, -1):
@@ -123,6 +134,39 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
         return with_values(values)
     further = _by_simplex(shapes, ranges, values, gain_of)
     return with_values(further if gain_of(further) > best + LEAST_FURTHER else values)
+
+
+def _moment(
+    problem: Problem, here: float, gain: float, gain_since: Callable[[float], float]
+) -> tuple[float, float]:
+    """The moment from which a term explains most, and its gain.
+
+    It is the start of a recording, unless a moment within one explains more.
+    """
+    begun = starts(problem.signals)
+    if len(begun):
+        near = float(begun[np.abs(begun - here).argmin()])
+        first = _climbed(begun, near, gain_since(near), len(begun) // COARSE, gain_since)
+        here, gain = first if first[1] > gain - LEAST_FURTHER else (here, gain)
+    order = np.sort(problem.signals.clock)
+    step = len(order) // (COARSE * (len(begun) + 1))
+    within, more = _climbed(order, here, gain, step, gain_since)
+    return (within, more) if more > gain + LEAST_FURTHER else (here, gain)
+
+
+def _climbed(
+    values: Array, here: float, gain: float, step: int, gain_of: Callable[[float], float]
+) -> tuple[float, float]:
+    """The best of sorted values, found from one of them with decreasing steps."""
+    place, step = int(np.searchsorted(values, here)), max(1, step)
+    while step >= 1:
+        for there in (place + step, place - step):
+            if 0 <= there < len(values) and (more := gain_of(float(values[there]))) > gain:
+                place, gain = there, more
+                break
+        else:
+            step //= 2
+    return float(values[min(place, len(values) - 1)]), gain
 
 
 def _by_simplex(

@@ -20,6 +20,7 @@ def test_a_clear_name_is_sure_but_never_certain():
         {"alike": True},
         {"few": True},
         {"stays": True},
+        {"changes": True},
     ],
 )
 def test_what_speaks_against_a_name_lowers_it(against):

@@ -10,6 +10,9 @@ import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
+from skidyn.diagnosis._recordings import own_friction
+from skidyn.effects import Signals, make_terms
+from skidyn.evidence import make_problem
 from skidyn.identification import RBDRegressor
 
 
@@ -43,3 +46,15 @@ def test_a_gain_that_changed_for_some_recordings(log):
     kinds, _ = found(log, log.X, torque)
 
     assert set(kinds) == {("torque_gain", (2,))}
+
+
+def test_friction_of_the_model_may_have_another_level(log):
+    q, dq = (log.X[[f"{name}{j}" for j in (1, 2)]].to_numpy() for name in ("q", "dq"))
+    run, time = log.X["trajectory"].to_numpy(), log.X["time"].to_numpy()
+    signals = Signals(q, dq, np.zeros_like(q), run, time=time, robot=log.robot)
+    terms = make_terms(["viscous", "coulomb"], 2)
+    problem = make_problem(signals, log.y, robot=log.robot, rigid_body=True, terms=terms)
+
+    kinds = [(c.kind, c.joints) for c in own_friction(problem, ["coulomb", "friction_drift"])]
+
+    assert kinds == [(kind, (j,)) for kind in ("coulomb", "friction_drift") for j in (0, 1)]

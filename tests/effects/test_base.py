@@ -23,5 +23,5 @@ def test_units_of_sliders():
 def test_every_parameter_has_a_unit():
     for effect in map(get_effect, list_effects()):
         shape = {shape.name: 1.0 for shape in effect.shapes}
-        found = effect.parameters(np.ones(len(effect.coefficients)), shape)
+        found = effect.parameters(np.ones(len(effect.coefficients_of(shape))), shape)
         assert set(found) <= set(effect.units()), effect.kind

@@ -158,3 +158,14 @@ def test_a_term_knows_whether_it_has_the_plain_form_of_its_kind():
     assert not Term("asymmetric_friction", (1,)).is_further_form
     assert Term("asymmetric_friction", (1,), {"power": 2.0}).is_further_form
     assert not Term("end_stop", (1,), {"q_lim": 0.3, "side": 1.0}).is_further_form
+
+
+def test_an_effect_of_some_time_acts_then_only(signals):
+    spans = ((1, 4.0, 5.0),)
+    term = Term("offset", (1,), {"trajectories": (0, 1), "spans": spans})
+
+    (column,) = term.torque_columns(signals)[0].T
+
+    inside = (signals.trajectory == 0) | ((signals.clock >= 4.0) & (signals.clock <= 5.0))
+    np.testing.assert_allclose(column, inside.astype(float))
+    assert term.everywhere == Term("offset", (1,))

@@ -29,4 +29,20 @@ def test_friction_that_changed_at_once(signals):
     later = signals.clock >= 3.0
     np.testing.assert_allclose(columns[:, 0], later * signals.dq[:, 0])
     np.testing.assert_allclose(columns[:, 1], later * signals.sign[:, 0])
-    assert not columns[:, 2:].any()
+    assert columns.shape[1] == 2
+
+
+def test_friction_of_another_level_has_no_moment(signals):
+    effect = get_effect("friction_drift")
+    columns = effect.columns(signals, 0, level=1.0)
+    np.testing.assert_allclose(columns, np.column_stack([signals.dq[:, 0], signals.sign[:, 0]]))
+    assert effect.meaning({}) == ""
+    assert "3 s" in effect.meaning({"since": {"value": 3.0, "unit": "s"}})
+
+
+def test_a_change_in_the_last_recording_alone_is_not_tried(signals):
+    effect = get_effect("friction_drift")
+    moments = [shape["since"] for shape in effect.grid(signals, (0,)) if "since" in shape]
+    assert moments
+    assert max(moments) < 3.0  # where the last of two begins
+    assert not effect.admissible(signals, (0,), {"since": 3.0})

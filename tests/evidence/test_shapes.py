@@ -48,3 +48,18 @@ def test_a_forbidden_sign_gains_nothing(problem):
     gain = Gain(problem, own, problem.fit_own().noise, problem.target)
     rows = {j: -block for j, block in problem.term_rows(Term("coulomb", (2,))).items()}
     assert gain(rows, np.zeros(1)) == -np.inf
+
+
+@pytest.mark.parametrize(("run", "second"), [(5, 0.0), (3, 4.0)])
+def test_the_moment_of_a_change_is_found(problem, run, second):
+    signals = problem.signals.with_(time=problem.signals.time + 20.0 * problem.signals.trajectory)
+    moment = 20.0 * run + second
+    torque = problem.torque - 1.0 * (signals.time >= moment)[:, None] * np.sign(signals.dq)
+    changed = make_problem(signals, torque, robot=ROBOT, rigid_body=True, terms=list(problem.terms))
+    own = [changed.term_rows(t) for t in changed.terms]
+    gain = Gain(changed, own, changed.fit_own().noise, changed.target)
+    rough = Term("friction_drift", (1,), {"since": 20.0})
+
+    found = refine_term(changed, rough, gain).shape["since"]
+
+    assert found == pytest.approx(moment, abs=0.1 if second else 1e-9)

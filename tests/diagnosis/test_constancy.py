@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An effect that changes over the log or with the motion is recognized."""
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_planar_arm
+from skidyn.diagnosis import Candidate
+from skidyn.diagnosis._constancy import changes
+from skidyn.diagnosis._hypothesis import Hypothesis, SearchResult
+from skidyn.diagnosis._rule import CHANGE_SHARE
+from skidyn.effects import Signals, Term, make_terms
+from skidyn.evidence import make_problem
+
+ROBOT = load_planar_arm()
+RUN = np.repeat(np.arange(8), 600)
+SINCE = np.tile(np.arange(0, 6, 0.01), 8)
+
+
+@pytest.fixture(scope="module")
+def motion():
+    time = 10.0 * RUN + SINCE
+    speed = np.array([0.9, 1.3]) + 0.1 * RUN[:, None]
+    q, dq = np.sin(speed * SINCE[:, None]), speed * np.cos(speed * SINCE[:, None])
+    return Signals(q, dq, -(speed**2) * q, RUN, time=time, robot=ROBOT)
+
+
+@pytest.fixture(scope="module")
+def change_of(motion):
+    """Change of a spring that is found on joint 2 where another torque acts there."""
+    rigid = ROBOT.inverse_dynamics(motion.q, motion.dq, motion.ddq)
+    noise = 0.05 * np.random.default_rng(0).normal(size=rigid.shape)
+
+    def of(torque):
+        measured = rigid + 0.5 * motion.dq + 2.0 * np.sign(motion.dq) + noise
+        measured[:, 1] += torque
+        terms = make_terms(["viscous", "coulomb"], 2)
+        problem = make_problem(motion, measured, robot=ROBOT, rigid_body=True, terms=terms)
+        spring = Term("spring", (2,))
+        fit = problem.fit([*problem.terms, spring])
+        candidate = Candidate("spring", spring, problem.term_rows(spring))
+        finding = Hypothesis("spring", (candidate,), np.zeros(2), 0.0, 2)
+        return changes(problem, SearchResult([finding], fit, np.zeros_like(measured)))["spring"]
+
+    return of
+
+
+def test_the_same_spring_throughout_does_not_change(motion, change_of):
+    assert change_of(3.0 * motion.q[:, 1]) == 0.0
+
+
+@pytest.mark.parametrize("inside", [RUN >= 5, SINCE > 3.0])
+def test_a_spring_of_some_time_changes(motion, change_of, inside):
+    assert change_of(3.0 * motion.q[:, 1] * inside) > CHANGE_SHARE
+
+
+def test_a_spring_that_stiffens_changes_with_the_motion(motion, change_of):
+    assert change_of(3.0 * motion.q[:, 1] ** 3) > CHANGE_SHARE
+
+
+def test_friction_of_its_joint_that_changes_counts(motion, change_of):
+    dry = 1.0 * (RUN >= 4) * np.sign(motion.dq[:, 1])
+    assert change_of(3.0 * motion.q[:, 1] + dry) > CHANGE_SHARE

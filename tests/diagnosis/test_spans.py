@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects that begin within recordings are found with their times."""
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_planar_arm
+from skidyn.diagnosis._rule import Tester
+from skidyn.diagnosis._spans import span_candidates
+from skidyn.effects import Signals, make_terms
+from skidyn.evidence import make_problem
+
+ROBOT = load_planar_arm()
+KINDS = ("offset", "spring", "payload", "external_wrench")
+RUN = np.repeat(np.arange(8), 600)
+SINCE = np.tile(np.arange(0, 6, 0.01), 8)
+#: Seconds after its start at which something is hooked on in each of some recordings.
+BEGINS = {1: 2.0, 4: 3.5, 6: 1.2}
+
+
+@pytest.fixture(scope="module")
+def motion():
+    time = 10.0 * RUN + SINCE
+    speed = np.array([0.9, 1.3]) + 0.1 * RUN[:, None]
+    q, dq = np.sin(speed * SINCE[:, None]), speed * np.cos(speed * SINCE[:, None])
+    return Signals(q, dq, -(speed**2) * q, RUN, time=time, robot=ROBOT)
+
+
+def found_with(motion, torque):
+    """What begins within recordings where a torque is added on joint 2."""
+    measured = ROBOT.inverse_dynamics(motion.q, motion.dq, motion.ddq)
+    measured += 0.5 * motion.dq + 2.0 * np.sign(motion.dq)
+    measured += 0.05 * np.random.default_rng(0).normal(size=measured.shape)
+    measured[:, 1] += torque
+    terms = make_terms(["viscous", "coulomb"], 2)
+    problem = make_problem(motion, measured, robot=ROBOT, rigid_body=True, terms=terms)
+    blocks = [problem.term_rows(term) for term in terms]
+    tester = Tester(problem, blocks, problem.fit_own().noise, problem.target)
+    found = span_candidates(problem, KINDS, tester, lambda chance, _: chance < 1e-6, 30.0)
+    drops = [(tester.test(c.rows).drop, c.term) for own in found for c in own]
+    return [term for _, term in sorted(drops, key=lambda item: -item[0])]
+
+
+def hooked_on():
+    begins = np.array([BEGINS.get(run, np.inf) for run in range(8)])
+    return SINCE >= begins[RUN]
+
+
+def test_a_spring_that_is_hooked_on_is_found_with_its_times(motion):
+    best = found_with(motion, 2.0 * motion.q[:, 1] * hooked_on())[0]
+
+    assert (best.kind, best.joints, best.trajectories) == ("spring", (2,), (1, 4, 6))
+    for run, start, end in best.spans:
+        assert start == pytest.approx(10 * run + BEGINS[run], abs=0.15)
+        assert end == pytest.approx(10 * run + 6, abs=0.15)
+
+
+def test_what_acts_in_whole_recordings_has_no_times(motion):
+    assert not found_with(motion, 2.0 * motion.q[:, 1] * np.isin(RUN, [1, 4, 6]))
+
+
+def test_nothing_begins_where_nothing_is_hidden(motion):
+    assert not found_with(motion, 0.0)
+
+
+def test_one_recording_does_not_show_that_it_returns(motion):
+    assert not found_with(motion, 2.0 * motion.q[:, 1] * hooked_on() * (RUN == 4))
