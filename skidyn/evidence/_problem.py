@@ -132,7 +132,9 @@ class Problem:
         """The signals at one of every ``step`` samples, and the weights of the rows, by joint."""
         if step < 2:
             return self.signals, self.rows.weights
-        _, few = self.signals.once(("thinned", step), lambda: self.signals.thinned(step))
+        _, few = self.signals.once(
+            ("thinned", step), lambda: self.signals.thinned(step), of_fit=True
+        )
         if step not in self._thinned:
             between = interpolation(self.signals.segments, few.segments, step)
             self._thinned[step] = self.rows.thinned(between)

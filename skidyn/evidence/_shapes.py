@@ -109,16 +109,19 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
     values = [float(term.shape[s.name]) for s in shapes]
     best = gain(problem.term_rows(term), term.lowest)
     for i, (shape, (_, _, step)) in enumerate(zip(shapes, ranges, strict=True)):
+        came = 0
         for _ in range(ROUNDS):
             improved = False
             for way in (1, -1):
+                if way == -came:
+                    continue  # back to a value that explains less
                 here = values[i]
                 there = here * (1 + step) ** way if shape.spacing == "log" else here + way * step
                 trial = [*values[:i], float(there), *values[i + 1 :]]
                 if (value := gain_of(trial)) > best:
-                    best, values, improved = value, trial, True
+                    best, values, improved, came = value, trial, True, way
             if not improved:
-                step /= SHRINK
+                step, came = step / SHRINK, 0
     if len(shapes) == 1 or not np.isfinite(best):
         return with_values(values)
     further = _by_simplex(shapes, ranges, values, gain_of)
