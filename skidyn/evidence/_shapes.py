@@ -51,6 +51,19 @@ class Gain:
         self.model = Normal(gram, right, column_sizes(gram))
         self.residual = [t - a @ self.model.solution for a, t in zip(self.design, y, strict=True)]
 
+    @classmethod
+    def beside(
+        cls,
+        problem: Problem,
+        blocks: Sequence[dict[int, Array]],
+        sigma: Array,
+        target: Sequence[Array],
+    ) -> Gain:
+        """The gain function of a model; a search asks for the same one with many candidates."""
+        made_of = [sigma, *problem.rigid_rows, *target, *(b[j] for b in blocks for j in b)]
+        gain: Gain = problem.last("gain", made_of, lambda: cls(problem, blocks, sigma, target))
+        return gain
+
     def __call__(self, rows: dict[int, Array], lowest: Array) -> float:
         """Drop of squared error in units of the noise; -inf where a coefficient is too small."""
         z = {j: block / self.sigma[j] for j, block in rows.items()}
@@ -58,7 +71,7 @@ class Gain:
         own = np.asarray(sum(block.T @ block for block in z.values()))
         swept = own - cross.T @ self.model.solve(cross)
         slope = sum(block.T @ self.residual[j] for j, block in z.items())
-        swept = swept + (RIDGE * np.trace(own) + np.finfo(float).tiny) * np.eye(len(own))
+        swept.flat[:: len(own) + 1] += RIDGE * own.trace() + np.finfo(float).tiny
         coefficients = np.linalg.solve(swept, slope)
         if np.any(coefficients < lowest):
             return -np.inf
