@@ -48,3 +48,13 @@ def test_a_forbidden_sign_gains_nothing(problem):
     gain = Gain(problem, own, problem.fit_own().noise, problem.target)
     rows = {j: -block for j, block in problem.term_rows(Term("coulomb", (2,))).items()}
     assert gain(rows, np.zeros(1)) == -np.inf
+
+
+def test_the_gain_function_of_a_model_is_made_once(problem):
+    own = [problem.term_rows(t) for t in problem.terms]
+    sigma, target = np.ones(2), problem.target
+    gain = Gain.beside(problem, own, sigma, target)
+    assert Gain.beside(problem, own, sigma, target) is gain
+    assert Gain.beside(problem, own[:1], sigma, target) is not gain
+    noisier = Gain.beside(problem, own[:1], 2 * sigma, target)
+    np.testing.assert_array_equal(noisier.sigma, 2 * sigma)
