@@ -179,13 +179,15 @@ class Signals:
             for rows in self.segments
         ]
 
-    def once(self, name: Hashable, make: Callable[[], Any]) -> Any:
+    def once(self, name: Hashable, make: Callable[[], Any], *, of_fit: bool = False) -> Any:
         """Result of ``make`` for these signals, computed at the first call; it must not be changed.
 
         Effects are tried at many shapes; quantities independent of the shape are computed once. The
-        name must contain everything on which ``make`` depends other than the signals.
+        name must contain everything on which ``make`` depends other than the signals. Results are
+        kept when the model is fitted again, unless they are ``of_fit``: dependent on its load,
+        torque or inertial parameters.
         """
-        kept = self.__dict__.setdefault("_kept", {})
+        kept = self.__dict__.setdefault("_kept_of_fit" if of_fit else "_kept", {})
         if name not in kept:
             kept[name] = make()
         return kept[name]
@@ -193,7 +195,7 @@ class Signals:
     def __getstate__(self) -> dict[str, Any]:
         for name in _LATER:
             getattr(self, name)
-        return {name: value for name, value in self.__dict__.items() if name != "_kept"}
+        return {k: value for k, value in self.__dict__.items() if not k.startswith("_kept")}
 
     def named(self, name: str) -> Array:
         """A signal by its name, joints counted from 1: ``"dq3"``, ``"temp2"``, ``"time"``, ...
@@ -212,6 +214,10 @@ class Signals:
         new = replace(self, **{k: f.stored(self) for k, f in _LATER.items()} | changes)
         if not {"dq", "prismatic"} & set(changes) and "sign" in self.__dict__:
             new.__dict__["sign"] = self.sign
+        if _OF_FIT >= set(changes):
+            new.__dict__["_kept"] = self.__dict__.setdefault("_kept", {})
+            for name in _OF_CLOCK & set(self.__dict__):
+                new.__dict__[name] = self.__dict__[name]
         return new
 
     def take(self, rows: slice | NDArray[Any]) -> Signals:
@@ -226,15 +232,25 @@ class Signals:
 
         Their rows, and signals that keep the segments of these, so that no gap is closed.
         """
+        index, few = self.once(("thinned", step), lambda: self._thinned(step))
+        of_fit = {name: _rows(field.stored(self), index) for name, field in _LATER.items()}
+        of_fit["load"] = _rows(self.load, index)
+        return index, few.with_(**of_fit, inertial_parameters=self.inertial_parameters)
+
+    def _thinned(self, step: int) -> tuple[NDArray[np.int64], Signals]:
+        """As :meth:`thinned`, without what belongs to a fit."""
         parts = [np.arange(rows.start + step // 2, rows.stop, step) for rows in self.segments]
         parts = [part for part in parts if len(part)]
         index = np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)
-        few = self.take(index)
+        few = self.with_(**dict.fromkeys(_OF_FIT)).take(index)
         ends = np.cumsum([0, *map(len, parts)]).tolist()
         few.__dict__["segments"] = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
         return index, few
 
 
+#: Fields that a fit of the model sets, and what is computed once from the clock.
+_OF_FIT = {"load", "model_torque", "smooth_torque", "inertial_parameters"}
+_OF_CLOCK = {"segments", "clock", "rate", "steps"}
 #: Fields that are computed when they are first read.
 _LATER: dict[str, _Later] = {k: v for k, v in vars(Signals).items() if isinstance(v, _Later)}
 

@@ -120,6 +120,20 @@ class _Parser(argparse.ArgumentParser):
         raise SystemExit(BAD_INPUT)
 
 
+class _Version(argparse.Action):
+    """As the action ``version``, but the version is read from the metadata only if requested."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, **_: Any) -> None:
+        text = "show program's version number and exit"
+        super().__init__(option_strings, argparse.SUPPRESS, nargs=0, help=text)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any, **__: Any) -> NoReturn:
+        from skidyn import __version__
+
+        print(f"skidyn {__version__}")
+        parser.exit()
+
+
 def make_parser() -> argparse.ArgumentParser:
     """Parser of the command line.
 
@@ -128,7 +142,6 @@ def make_parser() -> argparse.ArgumentParser:
     argparse.ArgumentParser
         One subparser per command.
     """
-    from skidyn import __version__
     from skidyn._commands import COMMANDS
     from skidyn._commands._terminal import TeachingFormatter
 
@@ -138,7 +151,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=TeachingFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"skidyn {__version__}")
+    parser.add_argument("--version", action=_Version)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     for command in COMMANDS:
         command.add_parser(commands)

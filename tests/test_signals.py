@@ -85,3 +85,16 @@ def test_a_torque_of_the_model_is_computed_when_it_is_first_read():
     np.testing.assert_array_equal(moved.model_torque, [[2.0, 3.0], [6.0, 7.0]])
     assert moved.model_torque is moved.model_torque and len(calls) == 1
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(motion)).named("tau2"), torque()[:, 1])
+
+
+def test_only_what_depends_on_the_fit_is_computed_again_after_a_fit():
+    q, dq, ddq = np.random.default_rng(0).normal(size=(3, 20, 2))
+    signals = Signals(q, dq, ddq, np.repeat([5, 6], 10), load=q)
+    assert signals.once("sum", lambda: 1) == signals.once("loaded", lambda: 1, of_fit=True) == 1
+    again = signals.with_(load=2 * q)
+    assert again.once("sum", lambda: 2) == 1
+    assert again.once("loaded", lambda: 2, of_fit=True) == 2
+    assert again.with_(q=2 * q).once("sum", lambda: 3) == 3
+    index, few = again.thinned(3)
+    np.testing.assert_array_equal(few.load, 2 * q[index])
+    np.testing.assert_array_equal(signals.thinned(3)[1].load, q[index])

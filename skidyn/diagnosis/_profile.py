@@ -156,7 +156,7 @@ def refine(
         if candidate.n_shapes == 0:
             continue
         others = [c.rows for k, c in enumerate(refined) if k != i]
-        gain = Gain(problem, [*fixed, *others], sigma, target)
+        gain = Gain.beside(problem, [*fixed, *others], sigma, target)
         term = refine_term(problem, candidate.term, gain)
         refined[i] = replace(candidate, term=term, rows=problem.term_rows(term))
     return refined

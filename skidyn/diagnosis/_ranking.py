@@ -295,10 +295,6 @@ class RankingSearch(SearchState):
         if not rough:
             return []
         refined = self.settings.refined if refined is None else refined
-        before = {
-            within: profile_error(self.problem, self.blocks, self.sigma, self.target, within=within)
-            for within in (False, True)
-        }
         ranking = []
         for i, candidates in enumerate(track(rough, f"{self._round}: refining the best")):
             kind = candidates[0].kind
@@ -316,7 +312,8 @@ class RankingSearch(SearchState):
                     continue
             else:
                 after = self._errors(hypothesis, within)
-            gain = log_likelihood_gain(before[within], after, self.problem.rows.counts)
+            before = self.errors_now(within)
+            gain = log_likelihood_gain(before, after, self.problem.rows.counts)
             count = self._n_parameters(candidates)
             price = 2 * self._price(candidates)
             score = float(gain.sum()) - price * count
@@ -334,13 +331,14 @@ class RankingSearch(SearchState):
         A candidate that removes most of a joint's error is refined again with the remaining noise,
         because the joint had too low a weight before.
         """
-        sigma, reached = self.sigma.copy(), sorted({j for c in candidates for j in c.rows})
+        sigma, reached = self.sigma, sorted({j for c in candidates for j in c.rows})
         for _ in range(ROUNDS):
             candidates = refine(self.problem, self.blocks, candidates, sigma, self.target)
             errors = self._errors(Hypothesis("", tuple(candidates), np.zeros(0), 0.0, 0), within)
             left = errors.sum(0)[reached] / np.maximum(self.problem.rows.counts[reached], 1)
             if np.all(left > (1 - MASKED) * sigma[reached] ** 2):
                 break
+            sigma = sigma.copy()
             sigma[reached] = np.sqrt(left) + 1e-100
         return candidates, errors
 
@@ -425,10 +423,10 @@ class RankingSearch(SearchState):
         rivals = [h for h in ranking if h.kind == UNKNOWN and set(h.joints) & set(ripple.joints)]
         if not rivals or ripple.kind == UNKNOWN:
             return ripple
-        before = profile_error(self.problem, self.blocks, self.sigma, self.target)
         blocks = [*self.blocks, *(c.rows for c in ripple.candidates)]
         after = profile_error(self.problem, blocks, self.sigma, self.target)
-        score = float(log_likelihood_gain(before, after, self.problem.rows.counts).sum())
+        gain = log_likelihood_gain(self.errors_now(), after, self.problem.rows.counts)
+        score = float(gain.sum())
         if score > self.settings.ripple_share * max(h.score for h in rivals):
             return ripple
         return replace(ripple, score=min(score, ripple.score))

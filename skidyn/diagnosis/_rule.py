@@ -35,6 +35,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -505,9 +506,10 @@ class Tester:
         b = np.linalg.solve(gram + RIDGE * np.eye(k), score)
         left = [e - z @ b for e, z in zip(residual, new, strict=True)]
         drop = float(score @ b)
-        chance = self._stationary(new, left, drop, k)
+        inflation = cache(lambda j: float(variance_inflation(self.problem, [left[j]], [j])[0]))
+        chance = self._stationary(new, left, drop, k, inflation)
         if significant(chance):  # blocks can only raise it
-            chance = max(chance, self._by_blocks(rows, new, left, score))
+            chance = max(chance, self._by_blocks(rows, new, left, score, inflation))
         coefficients = np.zeros(len(told))
         coefficients[told] = b / size
         return Test(chance, coefficients, drop)
@@ -550,21 +552,33 @@ class Tester:
         mean = max((self._square - most) / self._free, 1e-300)
         return Test(_tail(most / k / mean, k, self._free), coefficients, drop)
 
-    def _stationary(self, new: list[Array], left: list[Array], drop: float, k: int) -> float:
+    def _stationary(
+        self,
+        new: list[Array],
+        left: list[Array],
+        drop: float,
+        k: int,
+        inflation: Callable[[int], float],
+    ) -> float:
         """P-value of the drop for a stationary residual."""
         # The joint with the largest weight of the column, and the slowest possible column.
         joint = int(np.argmax([float(np.sum(z**2)) for z in new]))
-        factor = float(variance_inflation(self.problem, [left[joint]], [joint])[0])
+        factor = inflation(joint)
         mean = sum(float(r @ r) for r in left) / self._free
         free = max(2.0, self._free / factor)
         return _tail(drop / k / factor / max(mean, 1e-300), k, free)
 
     def _by_blocks(
-        self, rows: dict[int, Array], new: list[Array], left: list[Array], score: Array
+        self,
+        rows: dict[int, Array],
+        new: list[Array],
+        left: list[Array],
+        score: Array,
+        inflation: Callable[[int], float],
     ) -> float:
         """P-value of the coefficients for independent scores of blocks."""
-        length = correlation_time(self.problem, left, list(rows)) * CORRELATION_TIMES
-        k = len(score)
+        correlated = self.problem.rows.hop * max(1.0, *map(inflation, rows))
+        length, k = correlated * CORRELATION_TIMES, len(score)
         longest = self._duration / (2 * k + ENOUGH_BLOCKS)
         block, count = time_blocks(self.problem, min(max(SHORTEST_BLOCK, length), longest))
         index = np.concatenate(block)

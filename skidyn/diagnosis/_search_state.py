@@ -85,6 +85,7 @@ class SearchState:
         self._reconsidering = False
         self._within: dict[Term, bool] = {}
         self._kept_tester: tuple[list[Array], Tester | None] = ([], None)
+        self._kept_errors: tuple[list[Array], dict[bool, Array]] = ([], {})
 
     @property
     def target(self) -> list[Array]:
@@ -231,11 +232,10 @@ class SearchState:
         further = others[len(self.chosen) :]
         if list(others[: len(self.chosen)]) != self.chosen:
             return Tester(self.problem, self.blocks_with(others), self.sigma, self.target)
-        blocks = self.blocks
-        made_of = [self.sigma, self.ripple, *(b[j] for b in blocks for j in b)]
+        made_of = self._made_of
         kept, tester = self._kept_tester
         if tester is None or len(kept) != len(made_of) or any(map(is_not, kept, made_of)):
-            tester = Tester(self.problem, blocks, self.sigma, self.target)
+            tester = Tester(self.problem, self.blocks, self.sigma, self.target)
             self._kept_tester = made_of, tester
         return tester.beside([c.rows for c in further]) if further else tester
 
@@ -254,10 +254,26 @@ class SearchState:
             self._within[term] = bool(shares.max() > CONFINED)
         return self._within[term]
 
+    @property
+    def _made_of(self) -> list[Array]:
+        """Arrays on which fits of the present model depend."""
+        return [self.sigma, self.ripple, *(b[j] for b in self.blocks for j in b)]
+
+    def errors_now(self, within: bool = False) -> Array:
+        """Held-out errors of the present model on the folds of single recordings, or of all."""
+        made_of = self._made_of
+        kept, errors = self._kept_errors
+        if len(kept) != len(made_of) or any(map(is_not, kept, made_of)):
+            self._kept_errors = made_of, errors = made_of, {}
+        if within not in errors:
+            errors[within] = profile_error(
+                self.problem, self.blocks, self.sigma, self.target, within=within
+            )
+        return errors[within]
+
     def _left(self) -> Array:
         """Held-out squared error of every joint with all findings so far."""
-        errors = profile_error(self.problem, self.blocks, self.sigma, self.target)
-        left: Array = errors.sum(0)
+        left: Array = self.errors_now().sum(0)
         return left
 
     @property

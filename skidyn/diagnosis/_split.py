@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -211,7 +212,12 @@ class _Products:
         grams[:, place, effect] = cross
         grams[:, effect, place] = cross.transpose(0, 2, 1)
         grams[:, effect, effect] = self.own[chosen].sum(0)
-        return left_out_errors(self.gram) - left_out_errors(grams)
+        return self.errors - left_out_errors(grams)
+
+    @cached_property
+    def errors(self) -> Array:
+        """Held-out squared error of the model alone by quarter, (4,)."""
+        return left_out_errors(self.gram)
 
 
 def _splits(grows: bool, own: Array, names: NDArray[Any]) -> list[list[Any]]:

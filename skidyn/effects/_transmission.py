@@ -119,7 +119,7 @@ def _shared(signals: Signals, joint: int, name: str, make: Callable[[], Array]) 
     one joint are evaluated in succession, and all joints together would take many times the memory
     of the log.
     """
-    kept: dict[tuple[int, str], Array] = signals.once("shared by shapes", dict)
+    kept: dict[tuple[int, str], Array] = signals.once("shared by shapes", dict, of_fit=True)
     if (joint, name) not in kept:
         for other in [key for key in kept if key[0] != joint]:
             del kept[other]
@@ -161,7 +161,7 @@ def _differentiate_torque(signals: Signals, joint: int, by: str) -> Array:
     if by == "acceleration":
         ones = np.broadcast_to(direction, q.shape)
         return inverse_dynamics(q, np.zeros_like(dq), ones, gravity=(0.0, 0.0, 0.0))
-    here: Array = signals.once("torque", lambda: inverse_dynamics(q, dq, ddq))
+    here: Array = signals.once("torque", lambda: inverse_dynamics(q, dq, ddq), of_fit=True)
     step = _STEP * signals.unit[joint]
     moved = inverse_dynamics(
         q + step * direction if by == "position" else q,
@@ -234,20 +234,22 @@ class AccelerationNoise(NamelessEffect):
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
         (joint,) = joints
-        fast = _fast_part(signals.ddq[:, joint], signals)
+        fast: Array = signals.once("fast accelerations", lambda: _fast_part(signals.ddq, signals))
         by_acceleration = _slope(signals, joint, "acceleration")
-        return {j: own[:, None] for j, own in enumerate(by_acceleration * fast)}
+        return {j: own[:, None] for j, own in enumerate(by_acceleration * fast[:, joint])}
 
 
 def _fast_part(values: Array, signals: Signals) -> Array:
-    """Part of a signal faster than any commanded motion, without a phase shift."""
+    """Part of signals faster than any commanded motion, without a phase shift."""
     from scipy.signal import butter, sosfiltfilt
 
     fast = np.zeros_like(values)
     for rows, step in zip(signals.segments, signals.steps, strict=True):
         part = values[rows]
         if len(part) > _FEWEST and 2 * _FAST * step < 1:
-            fast[rows] = sosfiltfilt(butter(2, 2 * _FAST * step, "high", output="sos"), part)
+            fast[rows] = sosfiltfilt(
+                butter(2, 2 * _FAST * step, "high", output="sos"), part, axis=0
+            )
     return fast
 
 

@@ -53,7 +53,8 @@ class Normal:
 
     def __init__(self, gram: Array, right: Array, scale: Array, ridge: float = RIDGE) -> None:
         self._scale = scale
-        normal = gram / scale[:, None] / scale + ridge * np.eye(len(scale))
+        normal = gram / scale[:, None] / scale
+        normal.flat[:: len(scale) + 1] += ridge
         self._factor = factored(normal)
         self.solution = self.solve(right)
 

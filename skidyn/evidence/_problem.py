@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, groupby
 from operator import is_
@@ -132,7 +132,9 @@ class Problem:
         """The signals at one of every ``step`` samples, and the weights of the rows, by joint."""
         if step < 2:
             return self.signals, self.rows.weights
-        _, few = self.signals.once(("thinned", step), lambda: self.signals.thinned(step))
+        _, few = self.signals.once(
+            ("thinned", step), lambda: self.signals.thinned(step), of_fit=True
+        )
         if step not in self._thinned:
             between = interpolation(self.signals.segments, few.segments, step)
             self._thinned[step] = self.rows.thinned(between)
@@ -256,6 +258,24 @@ class Problem:
         fits = [FittedAlone.of(a, y) for a, y in pairs]
         self._last["alone"] = made_of, (target, fits)
         return fits
+
+    def last(self, name: str, made_of: list[Any], make: Callable[[], Any]) -> Any:
+        """Result of ``make``, computed again only if it is asked for with other arrays.
+
+        Parameters
+        ----------
+        name : str
+            What it is; only the last result of a name is kept.
+        made_of : list of ndarray
+            All arrays on which it depends, the same objects if it has not changed.
+        make : callable
+            Function that returns the result, which must not be changed.
+        """
+        kept, found = self._last.get(name, ([], None))
+        if len(kept) != len(made_of) or not all(map(is_, kept, made_of)):
+            found = make()
+            self._last[name] = made_of, found
+        return found
 
     def sample_folds(self, joint: int, rows: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
         """Fold of samples, that of the nearest averaged row of a joint.

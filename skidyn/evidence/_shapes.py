@@ -54,6 +54,19 @@ class Gain:
         self.model = Normal(gram, right, column_sizes(gram))
         self.residual = [t - a @ self.model.solution for a, t in zip(self.design, y, strict=True)]
 
+    @classmethod
+    def beside(
+        cls,
+        problem: Problem,
+        blocks: Sequence[dict[int, Array]],
+        sigma: Array,
+        target: Sequence[Array],
+    ) -> Gain:
+        """The gain function of a model; a search asks for the same one with many candidates."""
+        made_of = [sigma, *problem.rigid_rows, *target, *(b[j] for b in blocks for j in b)]
+        gain: Gain = problem.last("gain", made_of, lambda: cls(problem, blocks, sigma, target))
+        return gain
+
     def __call__(self, rows: dict[int, Array], lowest: Array) -> float:
         """Drop of squared error in units of the noise; -inf where a coefficient is too small."""
         z = {j: block / self.sigma[j] for j, block in rows.items()}
@@ -61,7 +74,7 @@ class Gain:
         own = np.asarray(sum(block.T @ block for block in z.values()))
         swept = own - cross.T @ self.model.solve(cross)
         slope = sum(block.T @ self.residual[j] for j, block in z.items())
-        swept = swept + (RIDGE * np.trace(own) + np.finfo(float).tiny) * np.eye(len(own))
+        swept.flat[:: len(own) + 1] += RIDGE * own.trace() + np.finfo(float).tiny
         coefficients = np.linalg.solve(swept, slope)
         if np.any(coefficients < lowest):
             return -np.inf
@@ -120,16 +133,19 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
 
             values[i], best = _moment(problem, values[i], best, gain_since)
             continue
+        came = 0
         for _ in range(ROUNDS):
             improved = False
             for way in (1, -1):
+                if way == -came:
+                    continue  # back to a value that explains less
                 here = values[i]
                 there = here * (1 + step) ** way if shape.spacing == "log" else here + way * step
                 trial = [*values[:i], float(there), *values[i + 1 :]]
                 if (value := gain_of(trial)) > best:
-                    best, values, improved = value, trial, True
+                    best, values, improved, came = value, trial, True, way
             if not improved:
-                step /= SHRINK
+                step, came = step / SHRINK, 0
     if len(shapes) == 1 or not np.isfinite(best):
         return with_values(values)
     further = _by_simplex(shapes, ranges, values, gain_of)

@@ -63,3 +63,13 @@ def test_the_moment_of_a_change_is_found(problem, run, second):
     found = refine_term(changed, rough, gain).shape["since"]
 
     assert found == pytest.approx(moment, abs=0.1 if second else 1e-9)
+
+
+def test_the_gain_function_of_a_model_is_made_once(problem):
+    own = [problem.term_rows(t) for t in problem.terms]
+    sigma, target = np.ones(2), problem.target
+    gain = Gain.beside(problem, own, sigma, target)
+    assert Gain.beside(problem, own, sigma, target) is gain
+    assert Gain.beside(problem, own[:1], sigma, target) is not gain
+    noisier = Gain.beside(problem, own[:1], 2 * sigma, target)
+    np.testing.assert_array_equal(noisier.sigma, 2 * sigma)
