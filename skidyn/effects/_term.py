@@ -117,7 +117,8 @@ class Term:
 
         ``spans`` in the shape lists them, in addition to ``trajectories``.
         """
-        return self.shape.get("spans", ())
+        spans: tuple[tuple[int, float, float], ...] = self.shape.get("spans", ())
+        return spans
 
     @property
     def _own_shape(self) -> dict[str, Any]:
