@@ -532,8 +532,8 @@ def _sure(
     told = finding.sentence
     if finding.change > CHANGE_SHARE:
         told += (
-            f" It would remove {max(finding.change, 0.01):.0%} more if it could change over the log "
-            "or with the motion, which makes the name less certain."
+            f" It would remove {max(finding.change, 0.01):.0%} more if it could change over the "
+            "log or with the motion, which makes the name less certain."
         )
     # Only one of several equivalent pairs of joints is right.
     return replace(finding, sentence=told, confidence=probability / (1 + len(finding.elsewhere)))
