@@ -29,6 +29,9 @@ IDLE_ROWS, IDLE_TIME = 8, 0.05
 #: Fewest places with zeros instead of missing torques; least ratio of the torque beside them to
 #: the median torque: near a true zero it is small.
 FEWEST_MISSING, JUMPS = 5, 0.4
+#: How many times as many zeros as torques one step beside zero are more than those of a coarse
+#: torque.
+MORE_ZEROS = 2.0
 #: Fewest values of a torque that is not coarse.
 FINE = 50
 #: Most steps that a position may be held before it catches up, and the share of the distance that
@@ -236,6 +239,9 @@ def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
         if not len(begins) or zero.mean() > MOSTLY_ZERO:
             continue
         least = float(values[values > 0].min())
+        nearest = max(np.sum(torque[~idle, k] == value) for value in (-least, least))
+        if zero.sum() < MORE_ZEROS * nearest:
+            continue  # zero is one of the steps of a coarse torque
         beside = np.minimum(values[begins - 1], values[ends])
         # dry friction passes a dead band from one sign to the other
         beside[signs[begins - 1, k] != signs[ends, k]] = 0.0

@@ -57,3 +57,10 @@ def test_lost_samples_of_a_nearly_constant_torque_are_missing(signals, torque, f
     holes[np.random.default_rng(1).choice(len(torque), 40, replace=False), 0] = 0.0
     told = {s.check: s for s in found(signals, holes)}
     assert told["missing_torque"].joints == (1,) and "overflowed_torque" not in told
+
+
+def test_zeros_of_a_coarse_torque_with_noise_are_not_missing(signals, torque, found):
+    noise = np.random.default_rng(1).normal(0, 0.8, torque.shape)
+    coarse = np.round((torque + noise) / 0.3) * 0.3
+    told = {s.check for s in found(signals, coarse)}
+    assert "missing_torque" not in told
