@@ -110,11 +110,15 @@ def elapsed(frame: pd.DataFrame) -> pd.Series:
 def answer(frame: pd.DataFrame, robot: Robot) -> str:
     """The verdict of a diagnosis, and what it names on which joints."""
     from skidyn.diagnosis import diagnose
+    from skidyn.exceptions import LogError
     from skidyn.identification import RBDRegressor
 
     n = robot.n_joints
     tau = frame[[f"tau{k + 1}" for k in range(n)]].to_numpy()
     model = RBDRegressor(robot, ("viscous", "coulomb"))
-    result = diagnose(model, frame, tau, force=True)
+    try:
+        result = diagnose(model, frame, tau, force=True)
+    except LogError as error:
+        return f"refused: {error}"
     found = sorted(f"{f.kind} {','.join(map(str, f.joints))}".strip() for f in result.findings)
     return "; ".join([result.verdict, *found])

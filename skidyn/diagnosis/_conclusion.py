@@ -16,7 +16,7 @@ from skidyn._text import joints_told, listed
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._confidence import confidence, mostly_stays
-from skidyn.diagnosis._constancy import changes
+from skidyn.diagnosis._constancy import Change, changes
 from skidyn.diagnosis._correction import is_physics, refitted_errors
 from skidyn.diagnosis._episodes import (
     Episode,
@@ -154,7 +154,9 @@ def conclude(
     whole = problem.whole_trajectories
     scores = {h.kind: h.score for h in result.findings}
     changed = changes(problem, result)
-    findings = [replace(f, change=changed.get(f.kind, 0.0)) for f in findings]
+    for i, finding in enumerate(findings):
+        change = changed.get(finding.kind, Change())
+        findings[i] = replace(finding, change=change.share, instead=change.instead)
     findings = [
         _sure(f, findings, parts, ends, whole, f.margin * scores.get(f.kind, np.inf))
         for f in findings
@@ -526,7 +528,7 @@ def _sure(
         in_some=finding.trajectories is not None,
         few=finding.trajectories is not None and all(t.effect.by_recording for t in finding.terms),
         stays=finding.kind != UNKNOWN and mostly_stays(before, after, alike * parts.noise[same]),
-        changes=finding.change > CHANGE_SHARE,
+        changes=finding.change > CHANGE_SHARE or finding.instead is not None,
         has_name=finding.kind != UNKNOWN,
     )
     told = finding.sentence
@@ -534,6 +536,11 @@ def _sure(
         told += (
             f" It would remove {max(finding.change, 0.01):.0%} more if it could change over the "
             "log or with the motion, which makes the name less certain."
+        )
+    if finding.instead is not None:
+        told += (
+            f" The finding of {get_effect(finding.instead).title.lower()} would explain most of it "
+            "if its formula were different, which makes the name less certain."
         )
     # Only one of several equivalent pairs of joints is right.
     return replace(finding, sentence=told, confidence=probability / (1 + len(finding.elsewhere)))

@@ -7,6 +7,10 @@ of each part of the recordings [1]_, of the time since the start of the recordin
 and speed [2]_. The same is done with the friction of its joints over time. An effect that differs
 significantly, by more than a small share of what it explains, is less sure.
 
+The torque of an effect with another formula than the given one is not removed entirely, and what is
+left may look like a second effect. Such a second effect is less sure if the first one, times
+functions of time and motion, would explain most of it.
+
 References
 ----------
 .. [1] G. C. Chow (1960), Tests of equality between sets of coefficients in two linear regressions,
@@ -18,12 +22,13 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from skidyn._signals import Array
 from skidyn.diagnosis._hypothesis import UNKNOWN, SearchResult
-from skidyn.diagnosis._rule import CHANGE_LEVEL, CHANGE_PARTS, Tester
+from skidyn.diagnosis._rule import CHANGE_INSTEAD, CHANGE_LEVEL, CHANGE_PARTS, Tester
 from skidyn.diagnosis._search_state import replace_torque
 from skidyn.effects import Term
 from skidyn.evidence import Problem
@@ -32,7 +37,25 @@ from skidyn.evidence import Problem
 _Block = dict[int, Array]
 
 
-def changes(problem: Problem, result: SearchResult) -> dict[str, float]:
+@dataclass(frozen=True)
+class Change:
+    """What changes of effects explain.
+
+    Attributes
+    ----------
+    share : float
+        Squared error that a significant change of an effect removes, as a share of that which the
+        effect removes; 0 if no change is significant.
+    instead : str or None
+        Kind of another effect that was found, whose change would remove most of the squared error
+        that the effect removes.
+    """
+
+    share: float = 0.0
+    instead: str | None = None
+
+
+def changes(problem: Problem, result: SearchResult) -> dict[str, Change]:
     """How much better the effects that were found explain the log if they may change.
 
     Parameters
@@ -44,56 +67,79 @@ def changes(problem: Problem, result: SearchResult) -> dict[str, float]:
 
     Returns
     -------
-    dict of str to float
-        By kind, the squared error that a significant change removes, as a share of that which the
-        kind removes; 0 if no change is significant.
+    dict of str to Change
+        By kind.
     """
     named = [h for h in result.findings if h.kind != UNKNOWN and h.torque is None]
     if not named:
         return {}
     bare = replace_torque(problem, problem.torque - result.ripple)
-    terms, sigma = list(result.fit.terms), result.fit.noise
-    blocks = {term: bare.term_rows(term) for term in terms}
+    sigma, target = result.fit.noise, bare.target
+    blocks = {term: bare.term_rows(term) for term in result.fit.terms}
     own = dict(result.fit.terms.slices(len(bare.rigid_index)))
-    whole = Tester(bare, list(blocks.values()), sigma, bare.target)
-    found: dict[str, list[tuple[float, float]]] = {}
-    explained: dict[str, float] = {}
-    for kind in dict.fromkeys(h.kind for h in named):
-        alike = [c.term for h in named if h.kind == kind for c in h.candidates if c.term in own]
-        rest = [rows for term, rows in blocks.items() if term not in alike]
-        without = Tester(bare, rest, sigma, bare.target)
-        explained[kind] = sum(without.test(blocks[term]).drop for term in alike)
-        found[kind] = []
-        for term in alike:
-            torque = {j: b @ result.fit.coefficients[own[term]] for j, b in blocks[term].items()}
-            for block in _variants(bare, term, torque, blocks):
-                test = whole.test(block)
-                found[kind].append((test.chance, test.drop))
-    level = CHANGE_LEVEL / max(1, sum(map(len, found.values())))
+    whole = Tester(bare, list(blocks.values()), sigma, target)
+    torques: dict[str, dict[Term, _Block]] = {}
+    for hypothesis in named:
+        of_kind = torques.setdefault(hypothesis.kind, {})
+        for term in (c.term for c in hypothesis.candidates if c.term in own):
+            size = result.fit.coefficients[own[term]]
+            of_kind[term] = {j: block @ size for j, block in blocks[term].items()}
+    tests: dict[str, list[tuple[float, float]]] = {}
+    explained, instead = {}, {}
+    for kind, of_kind in torques.items():
+        rest = [rows for term, rows in blocks.items() if term not in of_kind]
+        without = Tester(bare, rest, sigma, target)
+        explained[kind] = sum(without.test(blocks[term]).drop for term in of_kind)
+        instead[kind] = _instead(bare, torques, kind, without, explained[kind])
+        variants = [v for t, torque in of_kind.items() for v in _variants(bare, t, torque, blocks)]
+        tests[kind] = [(test.chance, test.drop) for test in map(whole.test, variants)]
+    level = CHANGE_LEVEL / max(1, sum(map(len, tests.values())))
+    least = np.finfo(float).tiny
     return {
-        kind: max((d for chance, d in tests if chance < level), default=0.0)
-        / max(explained[kind], np.finfo(float).tiny)
-        for kind, tests in found.items()
+        kind: Change(
+            max((drop for chance, drop in found if chance < level), default=0.0)
+            / max(explained[kind], least),
+            instead[kind],
+        )
+        for kind, found in tests.items()
     }
+
+
+def _instead(
+    problem: Problem,
+    torques: dict[str, dict[Term, _Block]],
+    kind: str,
+    without: Tester,
+    explained: float,
+) -> str | None:
+    """Kind of another effect on the same joints whose change explains most of what a kind does."""
+    joints = {j for torque in torques[kind].values() for j in torque}
+    drops = {
+        other: max(
+            (
+                without.test(block).drop
+                for torque in of_kind.values()
+                if joints & set(torque)
+                for block in _reshaped(problem, torque)
+            ),
+            default=0.0,
+        )
+        for other, of_kind in torques.items()
+        if other != kind
+    }
+    best = max(drops, key=lambda other: drops[other], default=None)
+    return best if best is not None and drops[best] > CHANGE_INSTEAD * explained else None
 
 
 def _variants(
     problem: Problem, term: Term, torque: _Block, blocks: dict[Term, _Block]
 ) -> Iterator[_Block]:
     """The torque of a term, and the friction on its joints, times functions of time and motion."""
-    signals = problem.signals
     parts = _parts(problem, term.trajectories)
     later = _since_start(problem)
     if len(parts) > 1:
         yield {j: f[:, None] * _inside(problem, j, parts[1:]) for j, f in torque.items()}
-    yield {j: (f * later[j])[:, None] for j, f in torque.items()}
-    motion = {}
-    for j, f in torque.items():
-        position, speed = (
-            _standard(_means(problem, x, j)) for x in (signals.q[:, j], np.abs(signals.dq[:, j]))
-        )
-        motion[j] = f[:, None] * np.column_stack([position, speed, position**2, speed**2])
-    yield motion
+    yield from _reshaped(problem, torque)
     every = _parts(problem, None)
     for j in torque:
         own = [blocks[t][j] for t in problem.terms if t.places == (j,) and t.effect.by_recording]
@@ -103,6 +149,19 @@ def _variants(
         if len(every) > 1:
             yield {j: np.hstack([rows * x[:, None] for x in _inside(problem, j, every[1:]).T])}
         yield {j: rows * later[j][:, None]}
+
+
+def _reshaped(problem: Problem, torque: _Block) -> Iterator[_Block]:
+    """The torque of a term times functions of time, and of position and speed."""
+    signals, later = problem.signals, _since_start(problem)
+    yield {j: (f * later[j])[:, None] for j, f in torque.items()}
+    motion = {}
+    for j, f in torque.items():
+        position, speed = (
+            _standard(_means(problem, x, j)) for x in (signals.q[:, j], np.abs(signals.dq[:, j]))
+        )
+        motion[j] = f[:, None] * np.column_stack([position, speed, position**2, speed**2])
+    yield motion
 
 
 def _parts(problem: Problem, trajectories: Sequence[int] | None) -> list[Array]:

@@ -76,6 +76,8 @@ class Finding:
         Squared error that the effect, or the friction of its joints, would remove in addition if it
         changed over the log or with the motion, as a share of what it removes; 0 if no change is
         significant.
+    instead : str or None
+        Kind of another finding that would explain most of this one if its formula were different.
 
     Examples
     --------
@@ -104,6 +106,7 @@ class Finding:
     alike: bool = False
     elsewhere: tuple[tuple[int, ...], ...] = ()
     change: float = 0.0
+    instead: str | None = None
 
     def _repr_html_(self) -> str:
         from skidyn.diagnosis._notebook import finding_card
@@ -131,6 +134,7 @@ class Finding:
             "margin": self.margin,
             "confidence": self.confidence,
             "change": self.change,
+            "instead": self.instead,
             "trajectories": None if self.trajectories is None else list(self.trajectories),
             "when": [episode.to_dict() for episode in self.when],
             "sentence": self.sentence,

@@ -26,23 +26,30 @@ def motion():
 
 
 @pytest.fixture(scope="module")
-def change_of(motion):
-    """Change of a spring that is found on joint 2 where another torque acts there."""
+def changes_of(motion):
+    """Changes of effects that are found on joint 2 where another torque acts there, by kind."""
     rigid = ROBOT.inverse_dynamics(motion.q, motion.dq, motion.ddq)
     noise = 0.05 * np.random.default_rng(0).normal(size=rigid.shape)
 
-    def of(torque):
+    def of(torque, *found):
         measured = rigid + 0.5 * motion.dq + 2.0 * np.sign(motion.dq) + noise
         measured[:, 1] += torque
         terms = make_terms(["viscous", "coulomb"], 2)
         problem = make_problem(motion, measured, robot=ROBOT, rigid_body=True, terms=terms)
-        spring = Term("spring", (2,))
-        fit = problem.fit([*problem.terms, spring])
-        candidate = Candidate("spring", spring, problem.term_rows(spring))
-        finding = Hypothesis("spring", (candidate,), np.zeros(2), 0.0, 2)
-        return changes(problem, SearchResult([finding], fit, np.zeros_like(measured)))["spring"]
+        fit = problem.fit([*problem.terms, *found])
+        findings = [
+            Hypothesis(t.kind, (Candidate(t.kind, t, problem.term_rows(t)),), np.zeros(2), 0.0, 2)
+            for t in found
+        ]
+        return changes(problem, SearchResult(findings, fit, np.zeros_like(measured)))
 
     return of
+
+
+@pytest.fixture(scope="module")
+def change_of(changes_of):
+    """Change of a spring that is found on joint 2 where another torque acts there."""
+    return lambda torque: changes_of(torque, Term("spring", (2,)))["spring"].share
 
 
 def test_the_same_spring_throughout_does_not_change(motion, change_of):
@@ -61,3 +68,16 @@ def test_a_spring_that_stiffens_changes_with_the_motion(motion, change_of):
 def test_friction_of_its_joint_that_changes_counts(motion, change_of):
     dry = 1.0 * (RUN >= 4) * np.sign(motion.dq[:, 1])
     assert change_of(3.0 * motion.q[:, 1] + dry) > CHANGE_SHARE
+
+
+def test_what_another_formula_of_an_effect_leaves_is_less_sure_to_be_a_second_one(
+    motion, changes_of
+):
+    q, dq = motion.q[:, 1], motion.dq[:, 1]
+    spring, drag = Term("spring", (2,)), Term("nonlinear_viscous", (2,), {"power": 2.0})
+    both = changes_of(3.0 * q + 0.5 * dq * np.abs(dq), spring, drag)
+    assert both["nonlinear_viscous"].instead is both["spring"].instead is None
+
+    cubic = Term("nonlinear_spring", (2,), {"rest": 0.0})
+    left = changes_of(3.0 * q + 0.5 * q**3, spring, cubic)
+    assert left["nonlinear_spring"].instead == "spring"
