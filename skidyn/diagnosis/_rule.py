@@ -88,8 +88,8 @@ CHANGE_INSTEAD = 0.5
 
 # Effects that begin or end within recordings (``_spans.py``); ``nothing_hidden.py``.
 #: Rounds in which coefficients and times are determined in turn, and least number of recordings in
-#: which an effect must begin or end: a single one does not show that it returns.
-SPAN_ROUNDS, LEAST_SPANS = 8, 2
+#: which an effect must act: a single one does not show that it returns or stays.
+SPAN_ROUNDS, LEAST_RECORDINGS = 8, 2
 
 # Intermittent torques (``_episodes.py``); no false one: ``nothing_hidden.py``.
 #: Squared residual, in units of the noise, above which a row counts as excess, and the least sum of

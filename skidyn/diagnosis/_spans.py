@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._parts import PartScan, n_parts
-from skidyn.diagnosis._rule import LEAST_SPANS, SPAN_ROUNDS, Tester
+from skidyn.diagnosis._rule import LEAST_RECORDINGS, SPAN_ROUNDS, Tester
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 
@@ -163,7 +163,7 @@ class _Times:
     def candidate(self, whole: Candidate, inside: NDArray[np.bool_]) -> Candidate | None:
         """The effect at these times; None if it fills whole recordings."""
         recordings, spans = self.spans(inside)
-        if len(spans) < LEAST_SPANS:
+        if not spans or len(recordings) < LEAST_RECORDINGS:
             return None
         term = whole.term.with_shape(trajectories=recordings, spans=spans)
         tried = n_parts(len(self.names), len(recordings)) * self.moments

@@ -65,3 +65,13 @@ def test_nothing_begins_where_nothing_is_hidden(motion):
 
 def test_one_recording_does_not_show_that_it_returns(motion):
     assert not found_with(motion, 2.0 * motion.q[:, 1] * hooked_on() * (RUN == 4))
+
+
+def test_what_is_hooked_on_once_and_stays_is_found_with_its_moment(motion):
+    later = (RUN > 4) | (RUN == 4) & (SINCE >= 3.0)
+
+    best = found_with(motion, 2.0 * motion.q[:, 1] * later)[0]
+
+    assert (best.kind, best.joints, best.trajectories) == ("spring", (2,), (4, 5, 6, 7))
+    ((run, start, end),) = best.spans
+    assert (run, start, end) == (4, pytest.approx(43.0, abs=0.15), pytest.approx(46.0, abs=0.15))
