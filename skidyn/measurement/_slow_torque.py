@@ -24,6 +24,9 @@ PERIODS, ORDERS = range(2, 17), (1, 2, 4)
 #: Least log-likelihood gain of a period on all joints; share of the joints that must gain by it;
 #: how many times as large the largest differences are as the smallest ones, on one of them.
 SURE, AGREEING, TIMES = 40.0, 0.6, 1.7
+#: Share of the steps of a recording that may differ from the usual one by more than half of it: over
+#: a shorter step, the noise of a difference is larger.
+UNEVEN = 0.01
 #: Fewest differences of each phase, and least size of them as a share of the spread of the torque.
 FEWEST, ROUNDING = 30, 1e-9
 
@@ -79,7 +82,7 @@ def _common_period(
     parts = [
         np.log(np.abs(divided_differences(torque[rows], s.clock[rows], order)) + rounding)
         for rows in s.segments
-        if rows.stop - rows.start > 4 * FEWEST
+        if rows.stop - rows.start > 4 * FEWEST and _is_even(s.clock[rows])
     ]
     parts = [part - part.mean(axis=0) for part in parts]  # for squares without cancellation
     squares = [np.sum(part**2, axis=0) for part in parts]
@@ -103,6 +106,13 @@ def _common_period(
             alike = zip(joints.tolist(), gains.tolist(), times.tolist(), strict=True)
             most, found = total, (period, {k: (g, x) for k, g, x in alike if g > 0})
     return found
+
+
+def _is_even(clock: Array) -> bool:
+    """Whether nearly all steps of a recording have the same length."""
+    steps = np.diff(clock)
+    usual = np.median(steps)
+    return bool(np.mean(np.abs(steps - usual) > 0.5 * usual) <= UNEVEN)
 
 
 def _sizes(logs: Array, square: Array, period: int) -> tuple[Array, int, Array]:

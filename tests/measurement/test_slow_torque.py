@@ -66,3 +66,10 @@ def test_joints_whose_noise_hides_the_bus_are_shown_by_the_others():
             frame.loc[own.index, f"tau{k}"] = line(t, x, few) + noise
     told = {s.check for s in check_log(frame, robot).checks if s.certainty != "noted"}
     assert told == {"slow_torque"}
+
+
+def test_rows_that_are_not_evenly_spaced_have_no_period():
+    """Differences over shorter steps are larger, by their noise."""
+    row = FRAME.groupby("trajectory").cumcount()
+    left = FRAME[row % 4 < 2]
+    assert "slow_torque" not in {s.check for s in check_log(left, ROBOT).checks}
