@@ -24,8 +24,8 @@ PERIODS, ORDERS = range(2, 17), (1, 2, 4)
 #: Least log-likelihood gain of a period on all joints; share of the joints that must gain by it;
 #: how many times as large the largest differences are as the smallest ones, on one of them.
 SURE, AGREEING, TIMES = 40.0, 0.6, 1.7
-#: Share of the steps of a recording that may differ from the usual one by more than half of it: over
-#: a shorter step, the noise of a difference is larger.
+#: Share of the steps of a recording that may differ from the usual one by more than half of it:
+#: over a shorter step, the noise of a difference is larger.
 UNEVEN = 0.01
 #: Fewest differences of each phase, and least size of them as a share of the spread of the torque.
 FEWEST, ROUNDING = 30, 1e-9
