@@ -42,6 +42,10 @@ def test_an_equal_explanation_lowers_it_below_what_is_sure():
     assert weak < 0.9 and confidence(0.1, 1.0, 0.3, rivalled=True, lead=40.0) > 0.9
 
 
+def test_a_name_that_the_data_hardly_separates_from_another_is_not_sure():
+    assert confidence(0.08, 1.0, 0.3) > 0.9 > confidence(0.08, 1.0, 0.3, rivalled=True, lead=100.0)
+
+
 def test_that_something_has_no_name_is_less_sure():
     assert confidence(1.0, 1.0, 0.3, has_name=False) < 0.9 < confidence(1.0, 1.0, 0.3)
 
