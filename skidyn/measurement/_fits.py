@@ -327,6 +327,20 @@ class Fits:
                 self._fitted[motion, *key, rounds] = fit
         return [self._fitted[motion, *key, rounds] for key in read]
 
+    def offset(self, reading: Reading) -> float:
+        """Largest median difference from the stated bodies, in units of the scale of the residual.
+
+        Of a slider, the fit does not separate the mass from the inertia of its rotor.
+        """
+        there, own = self.nominal(reading), self.columns(replace(reading, **_PLAIN))[:, 0]
+        offsets = [0.0]
+        for j in range(self.n_joints):
+            column, sign = self.torque_column(reading, j)
+            if column in there.fits:
+                left = (sign * self._mean_torque[:, column] - own[:, j])[self.moving[:, column]]
+                offsets.append(abs(float(np.median(left))) / there.fits[column].scale)
+        return max(offsets)
+
     def coefficients(self, joint: int) -> Array:
         """Of a joint read as it is: multiple of its own torque, viscous, dry, rotor inertia."""
         return self._joint_fits(Reading(), [(joint, joint, 1.0)], ROUNDS)[0].coefficients

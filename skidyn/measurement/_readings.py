@@ -171,9 +171,9 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         if _without_gravity(fits, reading, here):
             # identified bodies compensate the rest of it
             restored, kept = _restored_gain(fits, absent.reading, reading)
-            another = any(c.kind == "gravity" and c.gain > absent.gain - TIED for c in judged)
-            if another and restored < LEAST:
-                return replace(absent, rivals=("gravity",))  # no torque depends on gravity along it
+            others = [c for c in judged if c.kind == "gravity" and c.gain > absent.gain - TIED]
+            if others and restored < LEAST:  # no torque depends on gravity along it
+                return _by_offsets(fits, absent, others)
             # if bodies of any mass explain the torque with gravity, the stated ones are wrong
             if kept > -TIED:
                 return replace(absent, restorable=restored > LEAST)
@@ -216,6 +216,19 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         if change.drop >= MOSTLY and angle >= NOTED:
             return _or_bodies(fits, reading, change)
     return None
+
+
+def _by_offsets(fits: Fits, absent: Change, others: Sequence[Change]) -> Change:
+    """No gravity, or gravity along a direction in which it only changes offsets.
+
+    The weight of a slider is a constant torque, which the offset of a fit replaces. The smaller
+    offset is likelier, if it is less than half of the other one, and that one exceeds the residual.
+    """
+    best = min(others, key=lambda change: fits.offset(change.reading))
+    without = fits.offset(absent.reading)
+    if without > 1.0 and fits.offset(best.reading) < 0.5 * without:
+        return replace(best, rivals=("no_gravity",))
+    return replace(absent, rivals=("gravity",))
 
 
 def _distinct(screened: list[tuple[float, Change]]) -> list[tuple[float, Change]]:

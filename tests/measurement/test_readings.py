@@ -6,7 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_panda, load_planar_arm, load_ur5, make_hidden_effect_log
+from skidyn.datasets import (
+    load_panda,
+    load_planar_arm,
+    load_scara,
+    load_ur5,
+    make_hidden_effect_log,
+)
 from skidyn.logs import check_log
 
 
@@ -130,3 +136,11 @@ def test_the_angle_of_a_first_joint_is_not_taken_for_gravity_along_an_axis():
     (one,) = [s for s in told if s.check == "reading"]
     name, _, angle = one.remedy.option.partition("=")
     assert name == "--zero q1" and float(angle) == pytest.approx(-1.274, abs=0.02)
+
+
+def test_the_weight_of_a_slider_shows_along_which_axis_gravity_is():
+    robot = load_scara()
+    log = make_hidden_effect_log(robot, None, n_trajectories=4, duration=5.0, random_state=2)
+    on_the_wall = replace(robot, gravity=np.array([9.81, 0.0, 0.0]))
+    (told,) = [s for s in check_log(log.frame, on_the_wall).checks if s.certainty != "noted"]
+    assert told.check == "reading" and told.remedy.option == "--gravity=0,0,-9.81"
