@@ -528,7 +528,8 @@ def _sure(
         in_some=finding.trajectories is not None,
         few=finding.trajectories is not None and all(t.effect.by_recording for t in finding.terms),
         stays=finding.kind != UNKNOWN and mostly_stays(before, after, alike * parts.noise[same]),
-        changes=finding.change > CHANGE_SHARE or finding.instead is not None,
+        changes=finding.change > CHANGE_SHARE,
+        instead=finding.instead is not None,
         has_name=finding.kind != UNKNOWN,
     )
     told = finding.sentence

@@ -28,9 +28,9 @@ FEW = -0.6
 #: Weight of an error that mostly remains on the joint where it was largest: more than this share of
 #: the part above the noise, and this multiple of the noise. A third of such effects are right.
 STAYS, MOSTLY, ABOVE_NOISE = -2.2, 0.6, 1.2
-#: Weight of an effect that would explain materially more if it changed over the log or with the
-#: motion (``_constancy.py``).
-CHANGES = -2.2
+#: Weight of an effect that the changed formula of another finding would explain
+#: (``_constancy.py``): the four of these in the logs of an examiner were wrong.
+INSTEAD = -2.2
 #: Weight of a suspicion about the signals of its joints, which would be another explanation.
 DOUBTED = -1.5
 #: Margins between which another explanation of the same joints is equally good or better; one that
@@ -64,6 +64,7 @@ def confidence(
     few: bool = False,
     stays: bool = False,
     changes: bool = False,
+    instead: bool = False,
     has_name: bool = True,
 ) -> float:
     """Probability that an effect is identified correctly.
@@ -93,7 +94,10 @@ def confidence(
     stays : bool, default=False
         Whether most of the error above the noise remains on its joints (:func:`mostly_stays`).
     changes : bool, default=False
-        Whether it, or the friction of its joints, changes over the log or with the motion.
+        Whether it, or the friction of its joints, changes over the log or with the motion, as on
+        real robots, for which no formula is exact.
+    instead : bool, default=False
+        Whether another finding would explain most of it if its formula were different.
     has_name : bool, default=True
         Whether it is a known effect.
 
@@ -108,10 +112,11 @@ def confidence(
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
     logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
-    logit += STAYS * stays + FEW * few + ALIKE * alike + CHANGES * changes
+    logit += STAYS * stays + FEW * few + ALIKE * alike + INSTEAD * instead
     equal = EQUAL_IN_SOME if in_some else EQUAL
     logit += EQUALLED * (rivalled and -ABOVE < margin and (margin < equal or lead < SEPARATES))
-    doubtful = not has_name or stays or changes or (rivalled and margin < ABOVE)
+    doubtful = not has_name or stays or changes or instead
+    doubtful |= rivalled and margin < ABOVE
     return min(MOST_IN_DOUBT if doubtful else MOST, float(1 / (1 + np.exp(-logit))))
 
 

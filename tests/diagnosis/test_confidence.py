@@ -21,6 +21,7 @@ def test_a_clear_name_is_sure_but_never_certain():
         {"few": True},
         {"stays": True},
         {"changes": True},
+        {"instead": True},
     ],
 )
 def test_what_speaks_against_a_name_lowers_it(against):
