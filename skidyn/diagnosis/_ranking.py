@@ -280,7 +280,10 @@ class RankingSearch(SearchState):
     def _spans(self) -> list[list[Candidate]]:
         """Effects that begin or end within recordings, those that may be possible."""
         tester, least = self.tester(self.chosen), self.settings.least_gain
-        found = span_candidates(self.problem, self.kinds, tester, self.significant, least)
+        # intervals of their own for the same kind again would follow any torque
+        already = {c.kind for c in self.chosen if c.term.spans}
+        kinds = [kind for kind in self.kinds if kind not in already]
+        found = span_candidates(self.problem, kinds, tester, self.significant, least)
         return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
 
     def _each_by_itself(self, candidate: Candidate) -> list[Candidate]:
