@@ -104,8 +104,9 @@ def confidence(
     Returns
     -------
     float
-        Between 0 and 0.98, or 0.88 for an unknown effect, for one that changes, for one with a
-        rival that explains nearly as much, or if most of the error remains.
+        Between 0 and 0.98, or 0.88 for an unknown effect, for one that changes, for one that a
+        rival or the changed formula of another finding explains as well, or if most of the error
+        remains.
     """
     # Where all known effects leave most of the error, the best of them need not be right.
     logit = CONSTANT + (0.0 if stays else MARGIN * min(max(margin, 0.0), 1.0))

@@ -30,6 +30,7 @@ from skidyn._signals import Array
 from skidyn.diagnosis._hypothesis import UNKNOWN, SearchResult
 from skidyn.diagnosis._rule import CHANGE_INSTEAD, CHANGE_LEVEL, CHANGE_PARTS, Tester
 from skidyn.diagnosis._search_state import replace_torque
+from skidyn.diagnosis._variables import average_at_rows
 from skidyn.effects import Term
 from skidyn.evidence import Problem
 
@@ -157,9 +158,8 @@ def _reshaped(problem: Problem, torque: _Block) -> Iterator[_Block]:
     yield {j: (f * later[j])[:, None] for j, f in torque.items()}
     motion = {}
     for j, f in torque.items():
-        position, speed = (
-            _standard(_means(problem, x, j)) for x in (signals.q[:, j], np.abs(signals.dq[:, j]))
-        )
+        both = np.column_stack([signals.q[:, j], np.abs(signals.dq[:, j])])
+        position, speed = (_standard(x) for x in average_at_rows(problem, j, both).T)
         motion[j] = f[:, None] * np.column_stack([position, speed, position**2, speed**2])
     yield motion
 
@@ -181,12 +181,6 @@ def _since_start(problem: Problem) -> list[Array]:
     """Time of every row since the middle of its recording, as a share of the length, by joint."""
     edges = np.cumsum([len(t) for t in problem.rows.time])[:-1]
     return np.split(problem.rows.spans[2] - 0.5, edges)
-
-
-def _means(problem: Problem, signal: Array, joint: int) -> Array:
-    """Mean of a signal over the window of every row of a joint."""
-    rows = problem.rows
-    return rows.average(signal, joint) / rows.average(np.ones_like(signal), joint)
 
 
 def _standard(values: Array) -> Array:

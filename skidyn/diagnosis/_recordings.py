@@ -57,20 +57,33 @@ def recording_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
         Kinds to try.
     """
     candidates = []
-    for kind in kinds:
-        effect = get_effect(kind)
-        if not effect.by_recording:
+    for whole in terms_by_recording(problem, kinds):
+        if not all(_mostly_both_ways(problem, j) for j in whole.places):
             continue
-        for joints in effect.sites(problem.few):
-            if effect.not_shown(problem.few, joints[0]):
-                continue
-            if not all(_mostly_both_ways(problem, j) for j in joints):
-                continue
-            whole = problem.term_rows(Term.at(kind, joints))
-            for group in groups_of_recordings(problem):
-                term = Term.at(kind, joints, {"trajectories": group})
-                candidates.append(Candidate(kind, term, rows_within(problem, whole, group)))
+        rows = problem.term_rows(whole)
+        for group in groups_of_recordings(problem):
+            term = whole.with_shape(trajectories=group)
+            candidates.append(Candidate(whole.kind, term, rows_within(problem, rows, group)))
     return candidates
+
+
+def terms_by_recording(problem: Problem, kinds: Iterable[str]) -> list[Term]:
+    """Terms, in all recordings, of every effect that may differ between them and is shown.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    kinds : iterable of str
+        Kinds to try.
+    """
+    return [
+        Term.at(kind, joints)
+        for kind in kinds
+        if (effect := get_effect(kind)).by_recording
+        for joints in effect.sites(problem.few)
+        if effect.not_shown(problem.few, joints[0]) is None
+    ]
 
 
 def own_friction(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from operator import is_not
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._last import LastResults
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
 from skidyn.diagnosis._held_out import shares_of_folds
@@ -78,24 +78,22 @@ class SearchState:
         self.by_recording = recording_candidates(problem, self.kinds)
         self.n_tests = max(1, len(self.pool) + len(self.by_recording))
         self.whole_pool = self.pool
-        self._kept_target: tuple[tuple[Array | None, Array | None], list[Array]] = (None, None), []
+        self._last = LastResults()
         self.start = self.left = np.zeros(problem.n_joints)
         #: Held-out gain of each candidate of the pool, from the last screening.
         self._drops = np.zeros(0)
         self._reconsidering = False
         self._within: dict[Term, bool] = {}
-        self._kept_tester: tuple[list[Array], Tester | None] = ([], None)
-        self._kept_errors: tuple[list[Array], dict[bool, Array]] = ([], {})
 
     @property
     def target(self) -> list[Array]:
         """Averaged torque of every joint to be explained, without lines of spectra."""
-        made_of = self.problem.torque, self.ripple
-        kept, target = self._kept_target
-        if any(map(is_not, kept, made_of)):
+
+        def averaged() -> list[Array]:
             rows, torque = self.problem.rows, self.problem.torque - self.ripple
-            target = [rows.average(torque[:, j], j) for j in range(self.problem.n_joints)]
-            self._kept_target = made_of, target
+            return [rows.average(torque[:, j], j) for j in range(self.problem.n_joints)]
+
+        target: list[Array] = self._last.get("target", [self.problem.torque, self.ripple], averaged)
         return target
 
     @property
@@ -232,11 +230,11 @@ class SearchState:
         further = others[len(self.chosen) :]
         if list(others[: len(self.chosen)]) != self.chosen:
             return Tester(self.problem, self.blocks_with(others), self.sigma, self.target)
-        made_of = self._made_of
-        kept, tester = self._kept_tester
-        if tester is None or len(kept) != len(made_of) or any(map(is_not, kept, made_of)):
-            tester = Tester(self.problem, self.blocks, self.sigma, self.target)
-            self._kept_tester = made_of, tester
+        tester: Tester = self._last.get(
+            "tester",
+            self._made_of,
+            lambda: Tester(self.problem, self.blocks, self.sigma, self.target),
+        )
         return tester.beside([c.rows for c in further]) if further else tester
 
     def is_judged_within(self, candidate: Candidate) -> bool:
@@ -261,15 +259,14 @@ class SearchState:
 
     def errors_now(self, within: bool = False) -> Array:
         """Held-out errors of the present model on the folds of single recordings, or of all."""
-        made_of = self._made_of
-        kept, errors = self._kept_errors
-        if len(kept) != len(made_of) or any(map(is_not, kept, made_of)):
-            self._kept_errors = made_of, errors = made_of, {}
-        if within not in errors:
-            errors[within] = profile_error(
+        errors: Array = self._last.get(
+            f"errors, {within=}",
+            self._made_of,
+            lambda: profile_error(
                 self.problem, self.blocks, self.sigma, self.target, within=within
-            )
-        return errors[within]
+            ),
+        )
+        return errors
 
     def _left(self) -> Array:
         """Held-out squared error of every joint with all findings so far."""

@@ -10,7 +10,7 @@ the recordings.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._parts import PartScan, n_parts
+from skidyn.diagnosis._recordings import terms_by_recording
 from skidyn.diagnosis._rule import LEAST_RECORDINGS, SPAN_ROUNDS, Tester
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
@@ -30,7 +31,7 @@ Span = tuple[int, float, float]
 
 def span_candidates(
     problem: Problem,
-    kinds: Iterable[str],
+    kinds: Sequence[str],
     tester: Tester,
     significant: Callable[[float, Candidate], bool],
     least: float,
@@ -41,7 +42,7 @@ def span_candidates(
     ----------
     problem : Problem
         Rows.
-    kinds : iterable of str
+    kinds : sequence of str
         Kinds to try.
     tester : Tester
         Tests given the present model.
@@ -79,20 +80,14 @@ def span_candidates(
     return list(found.values())
 
 
-def _everywhere(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
+def _everywhere(problem: Problem, kinds: Sequence[str]) -> list[Candidate]:
     """The effects that may differ between recordings, in all of them."""
-    few, terms = problem.few, []
+    terms = terms_by_recording(problem, kinds)
     for kind in kinds:
         effect = get_effect(kind)
         if effect.search == "trajectories" and problem.robot is not None:
             joints = tuple(range(problem.n_joints))
-            terms += [Term.at(kind, joints, shape) for shape in effect.grid(few, joints)]
-        elif effect.by_recording:
-            terms += [
-                Term.at(kind, joints)
-                for joints in effect.sites(few)
-                if effect.not_shown(few, joints[0]) is None
-            ]
+            terms += [Term.at(kind, joints, shape) for shape in effect.grid(problem.few, joints)]
     return [Candidate(term.kind, term, problem.term_rows(term)) for term in terms]
 
 

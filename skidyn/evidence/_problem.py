@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, groupby
 from operator import is_
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from skidyn._cores import each
+from skidyn._last import LastResults
 from skidyn._progress import tell
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, TermSum, get_effect
@@ -56,6 +57,8 @@ class Problem:
         Whether rigid-body parameters are identified together with the effects.
     logged : Signals or None
         Logged motion.
+    last : LastResults
+        Results that are asked for again; shared by copies.
     """
 
     robot: Robot | None
@@ -73,6 +76,7 @@ class Problem:
     _cache: dict[Term, dict[int, Array]] = field(default_factory=dict, repr=False)
     #: Last results that are asked for again; shared by copies, since they state what they are of.
     _last: dict[str, tuple[list[Any], Any]] = field(default_factory=dict, repr=False)
+    last: LastResults = field(default_factory=LastResults, repr=False)
     _thinned: dict[int, list[csr_matrix]] = field(default_factory=dict, repr=False)
 
     @property
@@ -258,24 +262,6 @@ class Problem:
         fits = [FittedAlone.of(a, y) for a, y in pairs]
         self._last["alone"] = made_of, (target, fits)
         return fits
-
-    def last(self, name: str, made_of: list[Any], make: Callable[[], Any]) -> Any:
-        """Result of ``make``, computed again only if it is asked for with other arrays.
-
-        Parameters
-        ----------
-        name : str
-            What it is; only the last result of a name is kept.
-        made_of : list of ndarray
-            All arrays on which it depends, the same objects if it has not changed.
-        make : callable
-            Function that returns the result, which must not be changed.
-        """
-        kept, found = self._last.get(name, ([], None))
-        if len(kept) != len(made_of) or not all(map(is_, kept, made_of)):
-            found = make()
-            self._last[name] = made_of, found
-        return found
 
     def sample_folds(self, joint: int, rows: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
         """Fold of samples, that of the nearest averaged row of a joint.

@@ -64,7 +64,7 @@ class Gain:
     ) -> Gain:
         """The gain function of a model; a search asks for the same one with many candidates."""
         made_of = [sigma, *problem.rigid_rows, *target, *(b[j] for b in blocks for j in b)]
-        gain: Gain = problem.last("gain", made_of, lambda: cls(problem, blocks, sigma, target))
+        gain: Gain = problem.last.get("gain", made_of, lambda: cls(problem, blocks, sigma, target))
         return gain
 
     def __call__(self, rows: dict[int, Array], lowest: Array) -> float:
