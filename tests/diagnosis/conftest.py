@@ -9,6 +9,7 @@ import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
+from skidyn.effects import Signals
 from skidyn.exceptions import LogWarning
 from skidyn.identification import RBDRegressor
 
@@ -18,6 +19,16 @@ HIDDEN = {
     "unknown_pose_friction": ({"dq1", "q2"}, "sin(q2) * sign(dq1)", "a"),
     "unknown_cable": ({"q1", "q2"}, "cos(q1 - q2)", "a"),
 }
+
+
+@pytest.fixture(scope="session")
+def motion():
+    """Eight recordings of 6 s of a planar arm, each a little faster and 10 s after the last."""
+    run, since = np.repeat(np.arange(8), 600), np.tile(np.arange(0, 6, 0.01), 8)
+    speed = np.array([0.9, 1.3]) + 0.1 * run[:, None]
+    q, dq = np.sin(speed * since[:, None]), speed * np.cos(speed * since[:, None])
+    time, robot = 10.0 * run + since, load_planar_arm()
+    return Signals(q, dq, -(speed**2) * q, run, time=time, robot=robot)
 
 
 @pytest.fixture(scope="session")

@@ -7,23 +7,13 @@ import pytest
 from skidyn.datasets import load_planar_arm
 from skidyn.diagnosis._rule import Tester
 from skidyn.diagnosis._spans import span_candidates
-from skidyn.effects import Signals, make_terms
+from skidyn.effects import make_terms
 from skidyn.evidence import make_problem
 
 ROBOT = load_planar_arm()
 KINDS = ("offset", "spring", "payload", "external_wrench")
-RUN = np.repeat(np.arange(8), 600)
-SINCE = np.tile(np.arange(0, 6, 0.01), 8)
 #: Seconds after its start at which something is hooked on in each of some recordings.
 BEGINS = {1: 2.0, 4: 3.5, 6: 1.2}
-
-
-@pytest.fixture(scope="module")
-def motion():
-    time = 10.0 * RUN + SINCE
-    speed = np.array([0.9, 1.3]) + 0.1 * RUN[:, None]
-    q, dq = np.sin(speed * SINCE[:, None]), speed * np.cos(speed * SINCE[:, None])
-    return Signals(q, dq, -(speed**2) * q, RUN, time=time, robot=ROBOT)
 
 
 def found_with(motion, torque):
@@ -41,13 +31,18 @@ def found_with(motion, torque):
     return [term for _, term in sorted(drops, key=lambda item: -item[0])]
 
 
-def hooked_on():
+def since_start(motion):
+    """Time since the beginning of its recording of every sample, s."""
+    return motion.time - 10.0 * motion.trajectory
+
+
+def hooked_on(motion):
     begins = np.array([BEGINS.get(run, np.inf) for run in range(8)])
-    return SINCE >= begins[RUN]
+    return since_start(motion) >= begins[motion.trajectory]
 
 
 def test_a_spring_that_is_hooked_on_is_found_with_its_times(motion):
-    best = found_with(motion, 2.0 * motion.q[:, 1] * hooked_on())[0]
+    best = found_with(motion, 2.0 * motion.q[:, 1] * hooked_on(motion))[0]
 
     assert (best.kind, best.joints, best.trajectories) == ("spring", (2,), (1, 4, 6))
     for run, start, end in best.spans:
@@ -56,7 +51,7 @@ def test_a_spring_that_is_hooked_on_is_found_with_its_times(motion):
 
 
 def test_what_acts_in_whole_recordings_has_no_times(motion):
-    assert not found_with(motion, 2.0 * motion.q[:, 1] * np.isin(RUN, [1, 4, 6]))
+    assert not found_with(motion, 2.0 * motion.q[:, 1] * np.isin(motion.trajectory, [1, 4, 6]))
 
 
 def test_nothing_begins_where_nothing_is_hidden(motion):
@@ -64,11 +59,13 @@ def test_nothing_begins_where_nothing_is_hidden(motion):
 
 
 def test_one_recording_does_not_show_that_it_returns(motion):
-    assert not found_with(motion, 2.0 * motion.q[:, 1] * hooked_on() * (RUN == 4))
+    assert not found_with(
+        motion, 2.0 * motion.q[:, 1] * hooked_on(motion) * (motion.trajectory == 4)
+    )
 
 
 def test_what_is_hooked_on_once_and_stays_is_found_with_its_moment(motion):
-    later = (RUN > 4) | (RUN == 4) & (SINCE >= 3.0)
+    later = motion.time >= 10.0 * 4 + 3.0
 
     best = found_with(motion, 2.0 * motion.q[:, 1] * later)[0]
 
