@@ -371,10 +371,13 @@ def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:
 
     If an explanation on other joints is equally good, one of the two is right, and both are
     reported. A finding that removes most of an error is kept as its best explanation; one that
-    removes very little needs a high confidence.
+    removes very little needs a high confidence. An effect whose times were chosen has to be
+    constant within them: otherwise they only show where the error of another effect is large.
     """
 
     def is_sure(finding: Finding) -> bool:
+        if finding.change > CHANGE_SHARE and any(term.spans for term in finding.terms):
+            return False
         likely = (finding.confidence or 1.0) * (2 if finding.alike else 1)
         likely *= 1 + len(finding.elsewhere)
         drop = max(f.error_drop for f in diagnosis.findings if f.kind == finding.kind)
@@ -528,7 +531,7 @@ def _sure(
         in_some=finding.trajectories is not None,
         few=finding.trajectories is not None and all(t.effect.by_recording for t in finding.terms),
         stays=finding.kind != UNKNOWN and mostly_stays(before, after, alike * parts.noise[same]),
-        changes=finding.change > CHANGE_SHARE,
+        change=finding.change,
         instead=finding.instead is not None,
         has_name=finding.kind != UNKNOWN,
     )

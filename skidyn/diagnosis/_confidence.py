@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from skidyn._signals import Array
+from skidyn.diagnosis._rule import CHANGE_SHARE
 
 #: Weights of the constant, of the margin, of the logarithm of the inflation of the variance by
 #: autocorrelation, of the decimal logarithm of the share of the error that is removed.
@@ -31,6 +32,10 @@ STAYS, MOSTLY, ABOVE_NOISE = -2.2, 0.6, 1.2
 #: Weight of an effect that the changed formula of another finding would explain
 #: (``_constancy.py``): the four of these in the logs of an examiner were wrong.
 INSTEAD = -2.2
+#: Weight of the decimal logarithm of the share by which an effect would explain more if it changed,
+#: relative to that which is material. On robots, six of the seven effects for which it exceeded .03
+#: were wrong, and those below it are known or likely (``real_recordings.py``).
+CHANGING = -1.5
 #: Weight of a suspicion about the signals of its joints, which would be another explanation.
 DOUBTED = -1.5
 #: Margins between which another explanation of the same joints is equally good or better; one that
@@ -63,7 +68,7 @@ def confidence(
     in_some: bool = False,
     few: bool = False,
     stays: bool = False,
-    changes: bool = False,
+    change: float = 0.0,
     instead: bool = False,
     has_name: bool = True,
 ) -> float:
@@ -93,9 +98,9 @@ def confidence(
         Whether it acts in few recordings only, and other forms of it were not tried there.
     stays : bool, default=False
         Whether most of the error above the noise remains on its joints (:func:`mostly_stays`).
-    changes : bool, default=False
-        Whether it, or the friction of its joints, changes over the log or with the motion, as on
-        real robots, for which no formula is exact.
+    change : float, default=0.0
+        Share of what it explains by which it would explain more if it, or the friction of its
+        joints, changed over the log or with the motion; no formula is exact for a real robot.
     instead : bool, default=False
         Whether another finding would explain most of it if its formula were different.
     has_name : bool, default=True
@@ -116,6 +121,8 @@ def confidence(
     logit += STAYS * stays + FEW * few + ALIKE * alike + INSTEAD * instead
     equal = EQUAL_IN_SOME if in_some else EQUAL
     logit += EQUALLED * (rivalled and -ABOVE < margin and (margin < equal or lead < SEPARATES))
+    changes = change > CHANGE_SHARE
+    logit += CHANGING * float(np.log10(max(change / CHANGE_SHARE, 1.0)))
     doubtful = not has_name or stays or changes or instead
     doubtful |= rivalled and margin < ABOVE
     return min(MOST_IN_DOUBT if doubtful else MOST, float(1 / (1 + np.exp(-logit))))

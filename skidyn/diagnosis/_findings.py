@@ -193,12 +193,12 @@ def make_finding(
     formulas = [u for u in unknowns if u.proposal is not None]
     if formulas:
         code = f'model = diagnosis.add("formula", joints={[u.joint for u in formulas]})'
-    elif term.trajectories is not None:
+    elif term.trajectories is not None or term.course:
         code = "model = diagnosis.model"
     else:
         code = f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'
     sentence = f"{told_briefly(title, joints, term.trajectories, parameters)}. "
-    sentence += _spans_told(term)
+    sentence += _spans_told(term) + _course_told(term)
     sentence += _fall_told(error_drop)
     if rivals:
         sentence += (
@@ -306,6 +306,21 @@ def _spans_told(term: Term) -> str:
     ]
     more = len(term.spans) - 4
     return f"It acts {listed([*times, f'in part of {more} more'] if more > 0 else times)}. "
+
+
+def _course_told(term: Term) -> str:
+    """How an effect changes steadily."""
+    if not term.course:
+        return ""
+    (_, _, first, _, end), (*_, last) = term.course[0], term.course[-1]
+    single = len(term.course) == 1 or (first, end) == term.course[1][2::2]
+    first, last = (first, end) if single else (first, last)
+    over = "over each recording" if single and len(term.course) > 1 else "over the log"
+    if max(first, last) < 1.0:  # the line reaches its full size in other recordings
+        return ""
+    if first < last:
+        return f"It grows steadily {over}, from {first:.0%} of the stated size. "
+    return f"It falls steadily {over}, from the stated size to {last:.0%} of it. "
 
 
 def _fall_told(drop: float) -> str:

@@ -15,6 +15,7 @@ from skidyn._cores import each
 from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._courses import course_candidates
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
@@ -54,16 +55,16 @@ class RankingSearch(SearchState):
     def rank(self) -> list[Hypothesis]:
         """Explanations of the residual, best first."""
         screening, recordings = self._screening(), self._by_kind_of_recording()
-        once = [self._lines, self._splits, self._parts, self._spans]
+        once = [self._lines, self._splits, self._parts, self._spans, self._courses]
         looks: list[Callable[[], Any]] = [*once, *screening, *recordings]
         text = f"{self._round}: screening effects"
-        lines, splits, parts, spans, *found = each(lambda look: look(), looks, text)
+        lines, splits, parts, spans, courses, *found = each(lambda look: look(), looks, text)
         rough = sorted(self._found(found[: len(screening)]) + splits, key=lambda item: item[1])
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
         ranking += [self._against_functions(h, ranking) for h in lines]
         ranking += self._finals([own for of_kind in found[len(screening) :] for own in of_kind])
         ranking += self._finals(parts, refined=0)  # their shapes are refined already
-        ranking += self._finals(spans, refined=0)
+        ranking += self._finals([*spans, *courses], refined=0)
         ranking += self._other_forms(ranking)
         # The least specific explanations are last: differences between recordings, and vibration.
         return sorted(
@@ -285,6 +286,14 @@ class RankingSearch(SearchState):
         kinds = [kind for kind in self.kinds if kind not in already]
         found = span_candidates(self.problem, kinds, tester, self.significant, least)
         return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
+
+    def _courses(self) -> list[list[Candidate]]:
+        """Effects that change steadily, those that may be possible."""
+        tester, least = self.tester(self.chosen), self.settings.least_gain
+        already = {c.kind for c in self.chosen if c.term.course}
+        kinds = [kind for kind in self.kinds if kind not in already]
+        possible = partial(self.can_be, others=self.chosen)
+        return course_candidates(self.problem, kinds, tester, possible, self.significant, least)
 
     def _each_by_itself(self, candidate: Candidate) -> list[Candidate]:
         """Effects of some recordings, with a separate size in each of them."""

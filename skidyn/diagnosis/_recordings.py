@@ -86,6 +86,27 @@ def terms_by_recording(problem: Problem, kinds: Iterable[str]) -> list[Term]:
     ]
 
 
+def everywhere(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
+    """The effects that may differ between recordings or change within them, in all of them.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    kinds : iterable of str
+        Kinds to try.
+    """
+    kinds = list(kinds)
+    terms = terms_by_recording(problem, kinds)
+    for kind in kinds:
+        effect = get_effect(kind)
+        whole = effect.scope == "robot" and (effect.drifts or effect.search == "trajectories")
+        if whole and problem.robot is not None:
+            joints = tuple(range(problem.n_joints))
+            terms += [Term.at(kind, joints, shape) for shape in effect.grid(problem.few, joints)]
+    return [Candidate(term.kind, term, problem.term_rows(term)) for term in terms]
+
+
 def own_friction(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
     """Friction that the given model contains, which may differ in a part of the recordings.
 

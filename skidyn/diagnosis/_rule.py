@@ -91,6 +91,10 @@ CHANGE_INSTEAD = 0.5
 #: which an effect must act: a single one does not show that it returns or stays.
 SPAN_ROUNDS, LEAST_RECORDINGS = 8, 2
 
+# Effects that change steadily (``_courses.py``); ``nothing_hidden.py``.
+#: Rounds in which coefficients and sizes at the ends are determined in turn.
+COURSE_ROUNDS = 4
+
 # Intermittent torques (``_episodes.py``); no false one: ``nothing_hidden.py``.
 #: Squared residual, in units of the noise, above which a row counts as excess, and the least sum of
 #: the excess of an episode: several successive rows far above quiet ones.

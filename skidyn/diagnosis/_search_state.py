@@ -299,6 +299,7 @@ class SearchState:
         if any("trajectories" in c.term.shape for c in candidates):
             count += len(np.unique(self.problem.signals.trajectory)) // 2
         count += 2 * sum(len(c.term.spans) for c in candidates)
+        count += 2 * any(c.term.course for c in candidates)
         return count
 
 

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._parts import PartScan, n_parts
-from skidyn.diagnosis._recordings import terms_by_recording
+from skidyn.diagnosis._recordings import everywhere
 from skidyn.diagnosis._rule import LEAST_RECORDINGS, SPAN_ROUNDS, Tester
-from skidyn.effects import Term, get_effect
+from skidyn.effects import get_effect
 from skidyn.evidence import Problem
 
 #: Interval of a recording: its number, first and last time in s.
@@ -57,7 +57,9 @@ def span_candidates(
         return []
     scan = PartScan(tester)
     found: dict[str, list[Candidate]] = defaultdict(list)
-    for whole in _everywhere(problem, kinds):
+    passing = [k for k in kinds if get_effect(k).search == "trajectories"]
+    passing += [k for k in kinds if get_effect(k).by_recording]
+    for whole in everywhere(problem, passing):
         best, drop = None, -np.inf
         (part,) = scan.parts([whole])
         recordings = None if part is None else part.recordings
@@ -78,17 +80,6 @@ def span_candidates(
         if passes(tester.test(candidate.rows, candidate.zeros, passes).chance):
             found[candidate.kind].append(candidate)
     return list(found.values())
-
-
-def _everywhere(problem: Problem, kinds: Sequence[str]) -> list[Candidate]:
-    """The effects that may differ between recordings, in all of them."""
-    terms = terms_by_recording(problem, kinds)
-    for kind in kinds:
-        effect = get_effect(kind)
-        if effect.search == "trajectories" and problem.robot is not None:
-            joints = tuple(range(problem.n_joints))
-            terms += [Term.at(kind, joints, shape) for shape in effect.grid(problem.few, joints)]
-    return [Candidate(term.kind, term, problem.term_rows(term)) for term in terms]
 
 
 class _Times:

@@ -153,6 +153,9 @@ class Effect:
         and beyond the data.
     by_recording : bool
         Whether it may differ between recordings, and is also tested for some of them only.
+    drifts : bool
+        Whether its size may change steadily over the log or over each recording, as for a load that
+        empties or a base that sinks, and is also tested in this form.
     is_exact : bool
         Whether the formula is exact for this effect, so that any residual is another effect; other
         formulas are approximations and leave a residual.
@@ -208,6 +211,7 @@ class Effect:
     leading: ClassVar[int] = 0
     grows: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
+    drifts: ClassVar[bool] = False
     softness: ClassVar[float] = 0.0
     drawn: ClassVar[float] = 0.0
     is_exact: ClassVar[bool] = False

@@ -34,6 +34,7 @@ class BaseTilt(Effect):
     )
     scope = "robot"
     needs = ("robot",)
+    drifts = True
     is_exact = True
     simplicity = 12
     rivals = ("offset", "gravity_compensator")

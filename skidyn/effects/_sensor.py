@@ -28,6 +28,7 @@ class TorqueGain(Effect):
     forms = ({"sign": 1.0}, {"sign": -1.0})
     needs = ("model_torque",)
     by_recording = True
+    drifts = True
     simplicity = 5
     rivals = ("payload", "load_dependent_friction")
     separating_motion = "a known payload carried through the same motion"

@@ -33,6 +33,7 @@ class Offset(Effect):
 
     kind = "offset"
     by_recording = True
+    drifts = True
     title = "Torque offset"
     formula = r"\tau_0"
     coefficients = (Coefficient("tau0", "N m"),)

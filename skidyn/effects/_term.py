@@ -121,8 +121,20 @@ class Term:
         return spans
 
     @property
+    def course(self) -> tuple[tuple[int, float, float, float, float], ...]:
+        """Sizes of an effect that changes steadily: trajectory, two times in s, the size at each.
+
+        Sizes are shares of the coefficients; before the first time of a trajectory and after the
+        second one they stay as they are there. ``course`` in the shape lists them; the effect does
+        not act in trajectories without an entry.
+        """
+        course: tuple[tuple[int, float, float, float, float], ...] = self.shape.get("course", ())
+        return course
+
+    @property
     def _own_shape(self) -> dict[str, Any]:
-        return {k: v for k, v in self.shape.items() if k not in ("trajectories", "spans")}
+        where = ("trajectories", "spans", "course")
+        return {k: v for k, v in self.shape.items() if k not in where}
 
     @property
     def everywhere(self) -> Term:
@@ -153,6 +165,7 @@ class Term:
     def names(self) -> tuple[str, ...]:
         """Names of the columns, such as ``"viscous.Fv[1]"``, joints counted from 1."""
         chosen = "" if self.trajectories is None else f"@{','.join(map(str, self.trajectories))}"
+        chosen += "@course" if self.course else ""
         place = f"[{self._numbers(',')}]{chosen}"
         return tuple(f"{self.kind}.{c.name}{place}" for c in self.coefficients)
 
@@ -235,13 +248,36 @@ class Term:
             By the joint's place in arrays.
         """
         columns = self.effect.torque_columns(signals, self.places, **self._own_shape)
-        if self.trajectories is None:
+        if self.trajectories is None and not self.course:
             return columns
-        here = np.isin(signals.trajectory, self.trajectories)
-        for name, start, end in self.spans:
-            time = signals.clock
-            here &= (signals.trajectory != name) | ((time >= start) & (time <= end))
-        return {j: np.where(here[:, None], block, 0.0) for j, block in columns.items()}
+        size = self.size(signals)[:, None]
+        return {j: np.where(size != 0, size * block, 0.0) for j, block in columns.items()}
+
+    def size(self, signals: Signals) -> Array:
+        """Share of the coefficients with which the effect acts at every sample.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+
+        Returns
+        -------
+        ndarray of shape (n_samples,)
+            One everywhere unless the shape has ``trajectories``, ``spans`` or ``course``.
+        """
+        name, time = signals.trajectory, signals.clock
+        size = np.ones(len(time))
+        if self.trajectories is not None:
+            size[~np.isin(name, self.trajectories)] = 0.0
+        for own, start, end in self.spans:
+            size[(name == own) & ((time < start) | (time > end))] = 0.0
+        if self.course:
+            size[~np.isin(name, [own for own, *_ in self.course])] = 0.0
+        for own, start, first, end, last in self.course:
+            here = name == own
+            size[here] *= np.interp(time[here], [start, end], [first, last])
+        return size
 
     def parameters(self, coefficients: Array, signals: Signals | None = None) -> dict[str, Any]:
         """Physical parameters from fitted coefficients.

@@ -57,6 +57,7 @@ class _ToolEffect(Effect):
     needs = ("robot",)
     #: The trajectories with the payload are found by a split of the per-trajectory estimates.
     search = "trajectories"
+    drifts = True
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         if len(np.unique(signals.trajectory)) < 2:

@@ -18,6 +18,8 @@ from skidyn._signals import Array, Signals
 
 #: Diagonal added to normalised normal equations, far below any information in the data.
 RIDGE = 1e-9
+#: Norm of a column, as a share of the largest one, up to which it consists of rounding errors.
+VANISHING = 1e-13
 
 
 class Folded(Protocol):
@@ -65,9 +67,9 @@ class Normal:
 
 
 def column_sizes(gram: Array) -> Array:
-    """Norms of the columns behind a Gram matrix; 1 for those that vanish."""
+    """Norms of the columns behind a Gram matrix; 1 for those that vanish up to rounding errors."""
     size = np.sqrt(np.abs(np.diag(gram)))
-    size[size == 0] = 1.0
+    size[size <= VANISHING * size.max(initial=0.0)] = 1.0
     return np.asarray(size)
 
 
