@@ -306,6 +306,11 @@ def read_signals(
     """
     names = column_names(X)
     values = np.asarray(X.to_numpy() if hasattr(X, "to_numpy") else X)
+    if values.ndim != 2:
+        raise LogError(
+            f"X has {values.ndim} dimensions; a table or an array of shape (n_samples, n_columns) "
+            "is expected"
+        )
     torque = np.asarray(tau.to_numpy() if hasattr(tau, "to_numpy") else tau, dtype=float)
     torque = torque.reshape(len(torque), -1)
     columns = resolve_columns(

@@ -98,3 +98,9 @@ def test_only_what_depends_on_the_fit_is_computed_again_after_a_fit():
     index, few = again.thinned(3)
     np.testing.assert_array_equal(few.load, 2 * q[index])
     np.testing.assert_array_equal(signals.thinned(3)[1].load, q[index])
+
+
+def test_a_motion_that_is_no_table_is_refused():
+    robot = load_planar_arm()
+    with pytest.raises(LogError, match="X has 1 dimensions"):
+        diagnose(RBDRegressor(robot), np.zeros(10), np.zeros((10, 2)))

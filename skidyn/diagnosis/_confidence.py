@@ -35,7 +35,7 @@ INSTEAD = -2.2
 #: Weight of the decimal logarithm of the share by which an effect would explain more if it changed,
 #: relative to that which is material. On robots, six of the seven effects for which it exceeded .03
 #: were wrong, and those below it are known or likely (``real_recordings.py``).
-CHANGING = -1.5
+CHANGING = -2.0
 #: Weight of a suspicion about the signals of its joints, which would be another explanation.
 DOUBTED = -1.5
 #: Margins between which another explanation of the same joints is equally good or better; one that

@@ -68,7 +68,8 @@ def course_candidates(
         if drop < constant + least:
             continue
         candidate = course.candidate(whole, own, sizes, len(tried))
-        if sizes == (0.0, 1.0) and not possible(candidate):
+        less = whole.term.effect.grows and tester.estimate(candidate.rows)[0][0] < 0
+        if sizes == (0.0, 1.0) and (less or not possible(candidate)):
             candidate = course.candidate(whole, own, (1.0, 0.0), len(tried))
 
         def passes(chance: float, candidate: Candidate = candidate) -> bool:

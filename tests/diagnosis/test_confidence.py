@@ -20,7 +20,7 @@ def test_a_clear_name_is_sure_but_never_certain():
         {"alike": True},
         {"few": True},
         {"stays": True},
-        {"changes": True},
+        {"change": 0.1},
         {"instead": True},
     ],
 )
@@ -57,3 +57,11 @@ def test_a_name_that_leaves_most_of_the_error_is_not_sure():
     assert not mostly_stays(np.array([0.2, 0.1]), np.array([0.12, 0.1]), noise)
     assert not mostly_stays(np.array([0.105, 0.1]), np.array([0.104, 0.1]), noise)  # all is noise
     assert confidence(1.0, 1.0, 0.3, stays=True) < 0.9
+
+
+def test_the_more_an_effect_changes_the_less_sure_is_its_name():
+    sure = [confidence(0.3, 1.0, 0.3, change=change) for change in (0.02, 0.2, 0.8)]
+
+    assert sure == sorted(sure, reverse=True)
+    assert sure[0] > 0.8
+    assert sure[-1] < 0.5

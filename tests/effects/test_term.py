@@ -169,3 +169,17 @@ def test_an_effect_of_some_time_acts_then_only(signals):
     inside = (signals.trajectory == 0) | ((signals.clock >= 4.0) & (signals.clock <= 5.0))
     np.testing.assert_allclose(column, inside.astype(float))
     assert term.everywhere == Term("offset", (1,))
+
+
+def test_an_effect_with_a_course_has_its_sizes(signals):
+    time = signals.clock[signals.trajectory == 1]
+    ends = float(time.min()), float(time.max())
+    term = Term("offset", (1,), {"course": ((1, ends[0], 1.0, ends[1], 0.4),)})
+
+    (column,) = term.torque_columns(signals)[0].T
+
+    own = signals.trajectory == 1
+    assert not column[~own].any()
+    np.testing.assert_allclose(column[own], np.interp(time, ends, [1.0, 0.4]))
+    assert term.everywhere == Term("offset", (1,))
+    assert term.names != term.everywhere.names
