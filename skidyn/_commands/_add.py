@@ -6,7 +6,9 @@ from __future__ import annotations
 import argparse
 import json
 import shlex
-from typing import Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from skidyn._commands._arguments import JsonFile, command, with_joints, with_report
 from skidyn._commands._controllers import controller_told, driven_with, settings_of
@@ -16,9 +18,13 @@ from skidyn._exceptions import SkidynError
 from skidyn._text import digits
 from skidyn._writing import write_json
 
+if TYPE_CHECKING:
+    from skidyn.effects import Term
+
 DESCRIPTION = """\
 Add an effect to a model that skidyn diagnose has judged, and print the held-out error before and
-after. The report records the files of the log and the model.
+after. The report records the files of the log and the model, and the recordings and times of
+effects that act in some of them only.
 
   skidyn diagnose run*.csv --urdf robot.urdf --out report.json
   skidyn add --from report.json --effect dahl --joints 1,4 --out better.json
@@ -42,6 +48,33 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--out", type=JsonFile, metavar="JSON", help="write the parameters of the better model"
     )
+
+
+def limited_terms(path: str, kind: str, joints: Sequence[int] | None) -> list[Term]:
+    """Terms of a kind that a report limits to some recordings or times; it may be untrusted."""
+    from skidyn.effects import Term
+
+    effects = json.loads(Path(path).read_text(encoding="utf-8")).get("effects")
+    terms = []
+    for entry in effects if isinstance(effects, list) else ():
+        try:
+            on = tuple(map(int, entry["joints"]))
+            if entry["kind"] != kind or not (joints is None or set(on) & set(joints)):
+                continue
+            acts = entry.get("acts") or {}
+            when: dict[str, Any] = {}
+            if acts.get("trajectories") is not None:
+                when["trajectories"] = tuple(map(int, acts["trajectories"]))
+            for name in ("spans", "course"):
+                if acts.get(name):
+                    when[name] = tuple((int(k), *map(float, x)) for k, *x in acts[name])
+            if when:
+                terms.append(Term(kind, on, when))
+        except (AttributeError, KeyError, TypeError, ValueError):
+            raise SkidynError(
+                f"{path}: an entry of effects is {entry!r}; it must come from skidyn diagnose"
+            ) from None
+    return terms
 
 
 def run(options: argparse.Namespace) -> None:
@@ -69,7 +102,9 @@ def run(options: argparse.Namespace) -> None:
         fitted = better = model.fit(frame, tau)
         stated = controller_told(controller, robot.n_joints)
     else:
-        terms = make_terms([kind if joints is None else (kind, joints)], robot.n_joints)
+        terms = limited_terms(options.report, kind, joints) or make_terms(
+            [kind if joints is None else (kind, joints)], robot.n_joints
+        )
         fitted = model.with_effects(terms).fit(frame, tau)
         better = model.with_effects(fitted.effect_terms_[-len(terms) :])
     after = run_diagnosis(better, frame, tau, options, kinds=(), checks=given.checks).rmse_before

@@ -136,6 +136,7 @@ class Finding:
             "change": self.change,
             "instead": self.instead,
             "trajectories": None if self.trajectories is None else list(self.trajectories),
+            "acts": (self.terms[0].when or None) if self.terms else None,
             "when": [episode.to_dict() for episode in self.when],
             "sentence": self.sentence,
         }

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
@@ -440,17 +440,10 @@ class Diagnosis:
         if kind != "unknown" and get_effect(kind).of_servo:
             return self._with_setting(kind, joints)
         wanted = None if joints is None else set(map(int, joints))
-        for finding in self.findings:
-            if finding.kind != kind:
-                continue
-            terms = [
-                t
-                for t in finding.terms
-                if wanted is None or len(t.joints) > 1 or set(t.joints) <= wanted
-            ]
-            known = {j for t in terms for j in t.joints}
-            if terms and (wanted is None or wanted <= known):
-                return self._refitted(terms)
+        found = [t for f in self.findings if f.kind == kind for t in f.terms]
+        terms = [t for t in found if wanted is None or len(t.joints) > 1 or set(t.joints) <= wanted]
+        if terms and (wanted is None or wanted <= {j for t in terms for j in t.joints}):
+            return self._refitted(dict.fromkeys(terms))
         spec: Any = kind if joints is None else (kind, list(joints))
         return self._refitted(make_terms([spec], len(self.joint_names)))
 
@@ -487,7 +480,7 @@ class Diagnosis:
             )
         return [t for proposal in proposals for t in proposal.terms]
 
-    def _refitted(self, terms: Sequence[Term], data: tuple[Any, ...] | None = None) -> Any:
+    def _refitted(self, terms: Iterable[Term], data: tuple[Any, ...] | None = None) -> Any:
         model, data = self.base_model, self.data if data is None else data
         if is_physics(model):
             better = model.with_effects(terms).fit(*data)

@@ -18,6 +18,8 @@ from skidyn.effects._registry import get_effect
 
 #: Number of joints of the motion on which terms are tried; larger than that of any robot here.
 _JOINTS = 32
+#: Entries of a shape that any effect may have; others belong to the effect.
+_WHEN = ("trajectories", "spans", "course")
 
 
 @dataclass(frozen=True)
@@ -132,9 +134,13 @@ class Term:
         return course
 
     @property
+    def when(self) -> dict[str, Any]:
+        """Entries of the shape that limit when the effect acts, or with which size."""
+        return {k: v for k, v in self.shape.items() if k in _WHEN}
+
+    @property
     def _own_shape(self) -> dict[str, Any]:
-        where = ("trajectories", "spans", "course")
-        return {k: v for k, v in self.shape.items() if k not in where}
+        return {k: v for k, v in self.shape.items() if k not in _WHEN}
 
     @property
     def everywhere(self) -> Term:

@@ -6,6 +6,7 @@ import json
 import pytest
 
 from skidyn import cli
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 
 SERVO = '{"stiffness": [200, 12], "damping": [12, 0.6], "follows_velocity": false}'
 MODEL = ("--model", "rigid_body,viscous,coulomb,rotor_inertia")
@@ -33,6 +34,37 @@ def test_add_lowers_the_error_of_the_joint(diagnosed, run):
     assert errors["after"][1] < 0.5 * errors["before"][1]
     effects = json.loads(out.read_text("utf-8"))["effects"]
     assert ("stribeck", [2]) in [(e["kind"], e["joints"]) for e in effects]
+
+
+@pytest.fixture(scope="module")
+def loaded(work, tmp_path_factory):
+    """A report of a log in which some recordings carry a load."""
+    folder = tmp_path_factory.mktemp("loaded")
+    log = make_hidden_effect_log(load_planar_arm(), "payload", duration=5.0, random_state=3)
+    log.frame.to_csv(folder / "run.csv", index=False)
+    words = ["diagnose", folder / "run.csv", "--urdf", work / "arm.urdf"]
+    assert cli.main([*map(str, words), "--out", str(folder / "report.json")]) == cli.DONE
+    return folder
+
+
+def test_what_acts_in_some_recordings_is_added_to_these(loaded, run):
+    (effect,) = json.loads((loaded / "report.json").read_text("utf-8"))["effects"]
+    assert effect["kind"] == "payload"
+    assert effect["acts"] == {"trajectories": effect["trajectories"]}
+
+    code, errors = run("add", "--from", loaded / "report.json", "--effect", "payload")
+
+    assert code == cli.DONE
+    assert errors["after"][1] < 0.8 * errors["before"][1]
+
+
+def test_recordings_that_are_no_numbers_are_refused(loaded, capsys):
+    content = json.loads((loaded / "report.json").read_text("utf-8"))
+    content["effects"][0]["acts"] = {"trajectories": ["all"]}
+    (loaded / "damaged.json").write_text(json.dumps(content), encoding="utf-8")
+    words = ["add", "--from", str(loaded / "damaged.json"), "--effect", "payload"]
+    assert cli.main(words) == cli.BAD_INPUT
+    assert "it must come from skidyn diagnose" in capsys.readouterr().err
 
 
 def test_a_setting_of_a_servo_is_added_to_its_controller(weak_servo, work, run):
