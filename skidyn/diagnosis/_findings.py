@@ -313,12 +313,10 @@ def _course_told(term: Term) -> str:
     """How an effect changes steadily."""
     if not term.course:
         return ""
-    (_, _, first, _, end), (*_, last) = term.course[0], term.course[-1]
-    single = len(term.course) == 1 or (first, end) == term.course[1][2::2]
-    first, last = (first, end) if single else (first, last)
-    over = "over each recording" if single and len(term.course) > 1 else "over the log"
-    if max(first, last) < 1.0:  # the line reaches its full size in other recordings
-        return ""
+    ends = [(first, last) for _, _, first, _, last in term.course]
+    each = len(ends) > 1 and ends[0] == ends[1]
+    first, last = ends[0] if each else (ends[0][0], ends[-1][1])
+    over = "over each recording" if each else "over the log"
     if first < last:
         return f"It grows steadily {over}, from {first:.0%} of the stated size. "
     return f"It falls steadily {over}, from the stated size to {last:.0%} of it. "
