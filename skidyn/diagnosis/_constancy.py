@@ -3,9 +3,10 @@
 
 An effect with a wrong name may fit some recordings, or some of the motion, better than others. The
 torque of each effect is therefore tested times simple functions in addition to the completed model:
-of each part of the recordings [1]_, of the time since the start of the recording, and of position
-and speed [2]_. The same is done with the friction of its joints over time. An effect that differs
-significantly, by more than a small share of what it explains, is less sure.
+of each part of the recordings [1]_, of the time since the start of the recording, and of position,
+speed and, if it is logged, temperature [2]_. The same is done with the friction of its joints over
+time. An effect that differs significantly, by more than a small share of what it explains, is less
+sure.
 
 The torque of an effect with another formula than the given one is not removed entirely, and what is
 left may look like a second effect. Such a second effect is less sure if the first one, times
@@ -153,14 +154,16 @@ def _variants(
 
 
 def _reshaped(problem: Problem, torque: _Block) -> Iterator[_Block]:
-    """The torque of a term times functions of time, and of position and speed."""
+    """The torque of a term times functions of time, and of position, speed and temperature."""
     signals, later = problem.signals, _since_start(problem)
     yield {j: (f * later[j])[:, None] for j, f in torque.items()}
     motion = {}
     for j, f in torque.items():
-        both = np.column_stack([signals.q[:, j], np.abs(signals.dq[:, j])])
-        position, speed = (_standard(x) for x in average_at_rows(problem, j, both).T)
-        motion[j] = f[:, None] * np.column_stack([position, speed, position**2, speed**2])
+        own = [signals.q[:, j], np.abs(signals.dq[:, j])]
+        own += [] if signals.temperature is None else [signals.temperature[:, j]]
+        rows = average_at_rows(problem, j, np.column_stack(own))
+        functions = np.column_stack([_standard(x) for x in rows.T])
+        motion[j] = f[:, None] * np.hstack([functions, functions**2])
     yield motion
 
 
