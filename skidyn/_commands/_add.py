@@ -50,10 +50,11 @@ def add_parser(commands: Any) -> None:
     )
 
 
-def limited_terms(path: str, kind: str, joints: Sequence[int] | None) -> list[Term]:
+def limited_terms(path: str, kind: str, joints: Sequence[int] | None, n_joints: int) -> list[Term]:
     """Terms of a kind that a report limits to some recordings or times; it may be untrusted."""
-    from skidyn.effects import Term
+    from skidyn.effects import Term, get_effect
 
+    every = tuple(range(1, n_joints + 1))
     effects = json.loads(Path(path).read_text(encoding="utf-8")).get("effects")
     terms = []
     for entry in effects if isinstance(effects, list) else ():
@@ -69,7 +70,7 @@ def limited_terms(path: str, kind: str, joints: Sequence[int] | None) -> list[Te
                 if acts.get(name):
                     when[name] = tuple((int(k), *map(float, x)) for k, *x in acts[name])
             if when:
-                terms.append(Term(kind, on, when))
+                terms.append(Term(kind, every if get_effect(kind).scope == "robot" else on, when))
         except (AttributeError, KeyError, TypeError, ValueError):
             raise SkidynError(
                 f"{path}: an entry of effects is {entry!r}; it must come from skidyn diagnose"
@@ -102,7 +103,7 @@ def run(options: argparse.Namespace) -> None:
         fitted = better = model.fit(frame, tau)
         stated = controller_told(controller, robot.n_joints)
     else:
-        terms = limited_terms(options.report, kind, joints) or make_terms(
+        terms = limited_terms(options.report, kind, joints, robot.n_joints) or make_terms(
             [kind if joints is None else (kind, joints)], robot.n_joints
         )
         fitted = model.with_effects(terms).fit(frame, tau)

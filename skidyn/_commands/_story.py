@@ -35,7 +35,7 @@ def story_lines(
         yield "What is missing"
     for k, line in enumerate(story["findings"], 1):
         size = f": {line['size']}" if line["size"] else ""
-        when = f"; it acts {line['when']}" if line.get("when") else ""
+        when = f"; it {line['when']}" if line.get("when") else ""
         yield f"  {k}. {line['what']} on {line['where']}{size}; {line['sure']}{when}"
     yield from where_lines(failures)
     yield from motion_lines(story.get("simulation"))

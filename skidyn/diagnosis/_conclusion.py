@@ -372,12 +372,15 @@ def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:
     If an explanation on other joints is equally good, one of the two is right, and both are
     reported. A finding that removes most of an error is kept as its best explanation; one that
     removes very little needs a high confidence. An effect whose times were chosen has to be
-    constant within them: otherwise they only show where the error of another effect is large.
+    constant within them: otherwise they only show where the error of another effect is large. One
+    that another formula of another finding would explain has to be likely by itself.
     """
 
     def is_sure(finding: Finding) -> bool:
         if finding.change > CHANGE_SHARE and any(term.spans for term in finding.terms):
             return False
+        if finding.instead is not None:
+            return finding.confidence is None or finding.confidence >= GUESS
         likely = (finding.confidence or 1.0) * (2 if finding.alike else 1)
         likely *= 1 + len(finding.elsewhere)
         drop = max(f.error_drop for f in diagnosis.findings if f.kind == finding.kind)

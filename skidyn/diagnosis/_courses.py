@@ -50,9 +50,13 @@ def course_candidates(
         it removes with constant size, also in the best part of the recordings.
     """
     names = tuple(map(int, problem.rows.recordings))
-    within = _Course(problem, np.zeros(len(names)), np.ones(len(names)))
-    passed = np.concatenate([[0.0], np.cumsum(within.lengths)]) / within.lengths.sum()
-    over = _Course(problem, passed[:-1], passed[1:])
+    signals = problem.signals
+    times = [signals.clock[signals.trajectory == name] for name in names]
+    ends = np.array([(time.min(), time.max()) for time in times])
+    within = _Course(problem, ends, np.zeros(len(names)), np.ones(len(names)))
+    passed = np.concatenate([[0.0], np.cumsum(np.ptp(ends, axis=1))])
+    passed /= max(float(passed[-1]), 1e-300)
+    over = _Course(problem, ends, passed[:-1], passed[1:])
     scan = PartScan(tester)
     found: dict[str, list[Candidate]] = {}
     for whole in everywhere(problem, [kind for kind in kinds if get_effect(kind).drifts]):
@@ -89,23 +93,23 @@ class _Course:
     ----------
     problem : Problem
         Rows.
+    ends : ndarray of shape (n_recordings, 2), s
+        Start and end of every recording.
     first, last : ndarray of shape (n_recordings,)
         Values at the start and at the end of every recording.
     """
 
     problem: Problem
+    ends: Array
     first: Array
     last: Array
-
-    @property
-    def lengths(self) -> Array:
-        """Time from the first to the last row of every recording, in s."""
-        return self.problem.rows.spans[1]
 
     def rows(self, rows: dict[int, Array], recordings: Sequence[int]) -> dict[int, Array]:
         """Columns times the line, and zero in other recordings."""
         counts = self.problem.rows.counts
-        place, _, share = self.problem.rows.spans
+        place = self.problem.rows.spans[0]
+        start, length = self.ends[place, 0], np.ptp(self.ends, axis=1)[place]
+        share = (np.concatenate(self.problem.rows.time) - start) / np.maximum(length, 1e-300)
         line = self.first[place] + (self.last - self.first)[place] * share
         line = np.where(np.isin(self.problem.rows.recordings[place], recordings), line, 0.0)
         own = np.split(line, np.cumsum(counts)[:-1])
@@ -145,13 +149,12 @@ class _Course:
         self, whole: Candidate, recordings: Sequence[int], sizes: tuple[float, float], tried: int
     ) -> Candidate:
         """The effect with these sizes at 0 and 1 of the line."""
-        signals, course = self.problem.signals, []
-        names = self.problem.rows.recordings
-        for name, ends in zip(names, np.column_stack([self.first, self.last]), strict=True):
+        course, names = [], self.problem.rows.recordings
+        values = np.column_stack([self.first, self.last])
+        for name, (start, end), own in zip(names, self.ends, values, strict=True):
             if name in recordings:
-                time = signals.clock[signals.trajectory == name]
-                begin, end = (float(sizes[0] + (sizes[1] - sizes[0]) * x) for x in ends)
-                course.append((int(name), float(time.min()), begin, float(time.max()), end))
+                begin, finish = (float(sizes[0] + (sizes[1] - sizes[0]) * x) for x in own)
+                course.append((int(name), float(start), begin, float(end), finish))
         shape: dict[str, object] = {"course": tuple(course)}
         if len(course) < len(names):
             shape["trajectories"] = tuple(map(int, recordings))

@@ -199,7 +199,8 @@ def make_finding(
     else:
         code = f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'
     sentence = f"{told_briefly(title, joints, term.trajectories, parameters)}. "
-    sentence += _spans_told(term) + _course_told(term)
+    sentence += _spans_told(term)
+    sentence += f"It {course_told(term)}. " if term.course else ""
     sentence += _fall_told(error_drop)
     if rivals:
         sentence += (
@@ -309,8 +310,8 @@ def _spans_told(term: Term) -> str:
     return f"It acts {listed([*times, f'in part of {more} more'] if more > 0 else times)}. "
 
 
-def _course_told(term: Term) -> str:
-    """How an effect changes steadily."""
+def course_told(term: Term) -> str:
+    """How an effect changes steadily, as a predicate; empty if it does not."""
     if not term.course:
         return ""
     ends = [(first, last) for _, _, first, _, last in term.course]
@@ -318,8 +319,8 @@ def _course_told(term: Term) -> str:
     first, last = ends[0] if each else (ends[0][0], ends[-1][1])
     over = "over each recording" if each else "over the log"
     if first < last:
-        return f"It grows steadily {over}, from {first:.0%} of the stated size. "
-    return f"It falls steadily {over}, from the stated size to {last:.0%} of it. "
+        return f"grows steadily {over}, from {first:.0%} of the stated size"
+    return f"falls steadily {over}, from the stated size to {last:.0%} of it"
 
 
 def _fall_told(drop: float) -> str:

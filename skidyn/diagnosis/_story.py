@@ -10,7 +10,7 @@ import numpy as np
 
 from skidyn._text import digits, fall, give_or_take, inside, joints_told, listed, raised, times
 from skidyn.diagnosis._failures import FAILS
-from skidyn.diagnosis._findings import pairs_of, rival_title
+from skidyn.diagnosis._findings import course_told, pairs_of, rival_title
 from skidyn.diagnosis._rule import GUESS
 from skidyn.diagnosis._servo_motion import servo_motion_told
 from skidyn.effects import get_effect
@@ -234,7 +234,7 @@ def _line(diagnosis: Diagnosis, k: int, rows: Sequence[dict[str, Any]]) -> dict[
         "what": finding.title,
         "where": where(finding.joints, len(rows)) + trajectories_told(finding),
         "only": trajectories_told(finding),
-        "when": episodes_told(finding.when),
+        "when": when_told(finding),
         "size": ", ".join(shown[: _told(finding)]),
         "clear": dict(zip(shown, weights, strict=True)),
         "sure": sure(finding),
@@ -379,10 +379,14 @@ def trajectories_told(finding: Finding) -> str:
     return f" in trajector{'y' if len(which) == 1 else 'ies'} {', '.join(map(str, which))}"
 
 
-def episodes_told(episodes: Sequence[Any]) -> str:
-    """Times of an intermittent torque; empty for a permanent one."""
-    times = [f"from {e.start:.1f} to {e.end:.1f} s of trajectory {e.trajectory}" for e in episodes]
-    return listed(times[:3] + (["at other times"] if len(times) > 3 else [])) if times else ""
+def when_told(finding: Finding) -> str:
+    """When a finding acts or how it changes, as a predicate; empty if it always acts alike."""
+    times = [
+        f"from {e.start:.1f} to {e.end:.1f} s of trajectory {e.trajectory}" for e in finding.when
+    ]
+    if times:
+        return "acts " + listed(times[:3] + (["at other times"] if len(times) > 3 else []))
+    return next(filter(None, map(course_told, finding.terms)), "")
 
 
 def _quiet(rows: Sequence[dict[str, Any]]) -> str:
