@@ -280,9 +280,11 @@ def main() -> None:
             verdict = "right" if found[:1] == [True] else "among others" if any(found) else "miss"
         drop = 1 - np.mean(diagnosis.rmse_after / np.maximum(diagnosis.rmse_before, 1e-300))
         print(f"{name}: {truth}")
-        print(f"   verdict: {verdict}; error -{drop:.0%}; {time.perf_counter() - start:.0f} s")
+        print(f"   {verdict}; error -{drop:.0%}; {time.perf_counter() - start:.0f} s")
+        print(f"   verdict: {diagnosis.verdict}; unexplained: {diagnosis.unexplained}")
         for finding in diagnosis.findings:
-            print(f"   found: {finding.sentence}")
+            sure = "" if finding.confidence is None else f" (confidence {finding.confidence:.2f})"
+            print(f"   found: {finding.sentence}{sure}")
         if name == "XL330":
             print(f"   load: m g l = {gravity_moment(diagnosis):.3f} N m in the final model")
         for note in diagnosis.warnings:
