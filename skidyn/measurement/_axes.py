@@ -56,7 +56,7 @@ class Axes(Check):
         seen = None if measurement.stale or measurement.lost else explained(measurement)
         if seen is None or seen.errors[0].max() < WORTH:
             return
-        fits = seen.fits
+        fits = seen.fits.loaded()
         found = find_axis(fits)
         if found is None:
             return
@@ -64,7 +64,7 @@ class Axes(Check):
         if sum(c.gain for c in asked_changes(measurement, fits) if not c.other) > found.gain:
             return
         gains = np.nan_to_num(found.fits.nominal(Reading()).gain)
-        inflation = np.maximum(seen.identified.inflation, 1.0)
+        inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
         here, there = (NearBodies(f, Reading(), gains, inflation) for f in (fits, found.fits))
         duel = duel_of(here, there, range(fits.n_joints))
         if duel.beside < max(LEAST, BESIDE * duel.gain):

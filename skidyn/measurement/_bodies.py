@@ -152,7 +152,7 @@ class TorqueScale(Check):
         gains = {k: float(g) for k, g in enumerate(here) if np.isfinite(g) and g > 0}
         values = np.array(list(gains.values()))
         sure = np.array(list(known.values()))
-        rate = _other_rate(fits, bool(odd))
+        rate = _other_rate(fits.loaded(), bool(odd))
         if rate is not None:
             value = float(f"{rate:.4g}")
             words = f"time={1 / value:.6g},dq={value:g}"
@@ -229,7 +229,7 @@ class TorqueScale(Check):
             low, high = CLEARLY if k in known else USUAL
             if low <= gain <= high or (k not in known and gain < low):
                 continue  # the multiple of a torque that bodies hardly explain is small by itself
-            own, gained, apart = joint_gain(fits, k, gain)
+            own, gained, apart = joint_gain(fits.loaded(), k, gain)
             wrong = not USUAL[0] <= gain <= USUAL[1] and k in known
             if gained > (LEAST if wrong else SURE) and apart > LEAST and not low <= own <= high:
                 found[k] = own

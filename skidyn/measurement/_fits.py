@@ -11,7 +11,7 @@ wrong masses of the description.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -36,6 +36,13 @@ PLACES = 8
 WIDTH, SAMPLES, MOST_ROWS = 0.125, 6, 1200
 #: Columns of a joint in addition to those of the bodies: friction, rotor inertia and a constant.
 OWN = 4
+#: Parameters of the last body of which a load consists, its mass and first moments, from the end;
+#: numbers of recordings that may carry loads of their own.
+LOAD = np.arange(-10, -6)
+FEW_RUNS, MOST_RUNS = 1, 8
+#: Log-likelihood that every coefficient of a load must gain on average: half the logarithm of some
+#: 150 rows, twice.
+LOADED = 5.0
 #: Number of motions whose columns are cached.
 KEPT = 2
 #: Parts of a reading that do not concern the motion.
@@ -153,6 +160,8 @@ class Fits:
     backend : {"numpy", "once"}, default="numpy"
         Method to compute torques; for a robot that is only tried, generating a program is not worth
         its time.
+    loads : bool, default=False
+        Whether identified bodies include a load that differs from recording to recording.
     """
 
     robot: Robot
@@ -162,6 +171,7 @@ class Fits:
     recorded: Recorded
     left_out: frozenset[int] = frozenset()
     backend: str = "numpy"
+    loads: bool = False
     _fewer: dict[frozenset[int], Fits] = field(default_factory=dict, repr=False)
     _known: dict[Reading, Outcome] = field(default_factory=dict, repr=False)
     _moved: dict[Reading, Array] = field(default_factory=dict, repr=False)
@@ -171,6 +181,7 @@ class Fits:
     _felt: dict[Reading, list[tuple[Array, NDArray[np.int64]]]] = field(
         default_factory=dict, repr=False
     )
+    _loaded: Fits | None = field(default=None, repr=False)
 
     @property
     def n_joints(self) -> int:
@@ -183,16 +194,12 @@ class Fits:
         if left_out == self.left_out:
             return self  # with all that was fitted so far
         if left_out not in self._fewer:
-            self._fewer[left_out] = Fits(
-                self.robot, self.signals, self.torque, self.moving, self.recorded, left_out
-            )
+            self._fewer[left_out] = self._anew(left_out=left_out)
         return self._fewer[left_out]
 
     def of(self, robot: Robot) -> Fits:
         """The same rows, for another robot with the same joints, which is only tried."""
-        return Fits(
-            robot, self.signals, self.torque, self.moving, self.recorded, self.left_out, "once"
-        )
+        return self._anew(robot=robot, backend="once")
 
     def thinned(self, count: int) -> Fits:
         """Some of the rows, evenly over the log, for a first test."""
@@ -202,16 +209,40 @@ class Fits:
         rows = np.arange(0, self.n_rows, step)
         samples = (rows[:, None] * SAMPLES + np.arange(SAMPLES)).ravel()
         recorded = replace(self.recorded, picked=self.recorded.picked[samples])
-        signals, torque = self.signals.take(samples), self.torque[samples]
-        return Fits(self.robot, signals, torque, self.moving[rows], recorded, self.left_out)
+        return self._anew(
+            signals=self.signals.take(samples),
+            torque=self.torque[samples],
+            moving=self.moving[rows],
+            recorded=recorded,
+        )
+
+    def _anew(self, **changes: Any) -> Fits:
+        """Changed rows, of which nothing has been fitted."""
+        kept = {f.name: getattr(self, f.name) for f in fields(self) if not f.name.startswith("_")}
+        return Fits(**{**kept, **changes})
+
+    def loaded(self) -> Fits:
+        """The same rows, with loads where these explain far more than chance.
+
+        A load of a recording, as of a workpiece, is larger than most mistakes; identified bodies
+        that are common to all recordings would leave it as a residual in which they are lost.
+        """
+        count = n_loads(self.signals.trajectory)
+        if self.loads or not count:
+            return self
+        if self._loaded is None:
+            other = self._anew(loads=True)
+            gain = float(other.identified(Reading()).margin(self.identified(Reading())).sum())
+            self._loaded = other if gain > LOADED * count else self
+        return self._loaded
 
     def with_torque(self, torque: Array) -> Fits:
         """The same rows with another torque, (n_samples, n_joints); what motion implies is kept."""
-        return replace(self, torque=torque, _fewer={}, _known={}, _fitted={})
+        return replace(self, torque=torque, _fewer={}, _known={}, _fitted={}, _loaded=None)
 
     def with_motion(self, signals: Signals) -> Fits:
         """The same rows and torque with another motion."""
-        return Fits(self.robot, signals, self.torque, self.moving, self.recorded, self.left_out)
+        return self._anew(signals=signals)
 
     def scaled(self, gains: Mapping[int, float]) -> Fits:
         """The same rows with columns of the torque divided by gains."""
@@ -441,9 +472,12 @@ class Fits:
     def only(self, rows: NDArray[np.bool_]) -> Fits:
         """Some of the rows."""
         samples = np.repeat(rows, SAMPLES)
-        recorded = replace(self.recorded, picked=self.recorded.picked[samples])
-        signals, torque = self.signals.take(samples), self.torque[samples]
-        return Fits(self.robot, signals, torque, self.moving[rows], recorded, self.left_out)
+        return self._anew(
+            signals=self.signals.take(samples),
+            torque=self.torque[samples],
+            moving=self.moving[rows],
+            recorded=replace(self.recorded, picked=self.recorded.picked[samples]),
+        )
 
     def bodies(self) -> tuple[Array, dict[int, float]]:
         """Identified coefficients of the unchanged log, and scale of the residual by joint."""
@@ -510,12 +544,19 @@ class Fits:
             self._felt.clear()
             robot, s = self._robot(motion), self.motion(motion)
             base = base_parameter_index(robot)
-            regressor = self.mean_regressor(robot, s, base)
-            found = []
+            last = 10 * robot.n_bodies + LOAD if self.loads else LOAD[:0]
+            regressor = self.mean_regressor(robot, s, np.append(base, last))
+            number, found = s.trajectory[::SAMPLES], []
+            first = len(base) + OWN * self.n_joints
             for j in range(self.n_joints):
-                felt = np.flatnonzero(regressor[:, j].any(axis=0))  # bodies that the joint moves
+                felt = np.flatnonzero(regressor[:, j, : len(base)].any(axis=0))  # moved bodies
                 columns = np.hstack([regressor[:, j][:, felt], self._own_columns(s, j)])
-                found.append((columns, np.append(felt, len(base) + OWN * j + np.arange(OWN))))
+                place = np.append(felt, len(base) + OWN * j + np.arange(OWN))
+                carried = by_recording(regressor[:, j, len(base) :], number)
+                if carried.size and regressor[:, j, len(base) :].any():
+                    columns = np.hstack([columns, carried])
+                    place = np.append(place, first + np.arange(carried.shape[1]))
+                found.append((columns, place))
             self._felt[motion] = found
         return self._felt[motion]
 
@@ -537,6 +578,32 @@ class Fits:
             likelihood[c], scale[c], residual[c] = fit.likelihood, fit.scale, fit.residual
         of = dict(zip(columns, fits, strict=True))
         return Outcome(likelihood, np.full(n, np.nan), residual, scale, of)
+
+
+def n_loads(number: NDArray[np.int64]) -> int:
+    """Number of coefficients of loads of single recordings; none in one, or in many recordings."""
+    n = len(np.unique(number))
+    return len(LOAD) * (n - 1) if FEW_RUNS < n <= MOST_RUNS else 0
+
+
+def by_recording(columns: Array, number: NDArray[np.int64]) -> Array:
+    """Columns of every recording but the first, of a load that differs between them.
+
+    Parameters
+    ----------
+    columns : ndarray of shape (n_rows, n_columns)
+        Columns of the mass and first moments of the last body.
+    number : ndarray of shape (n_rows,)
+        Recording of every row.
+
+    Returns
+    -------
+    ndarray of shape (n_rows, n_columns * (n_recordings - 1))
+        None for a single recording, or for more than may carry loads of their own.
+    """
+    runs = np.unique(number) if n_loads(number) else number[:1]
+    rows = [(number == run)[:, None] for run in runs[1:]]
+    return np.hstack([columns * own for own in rows]) if rows else columns[:, :0]
 
 
 def friction(signals: Signals, joint: int) -> Array:

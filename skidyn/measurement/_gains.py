@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._delay import FEW_RUNS, MOST_RUNS
-from skidyn.measurement._duel import likely_load
+from skidyn.measurement._fits import FEW_RUNS, MOST_RUNS
+from skidyn.measurement._near_bodies import likely_load
 from skidyn.measurement._fits import SAMPLES, Fits, Reading
 from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies
 

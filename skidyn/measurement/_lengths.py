@@ -81,7 +81,8 @@ class Lengths(Check):
             return
         if measurement.torque_scatter < NOISELESS:
             return  # without noise, errors of the derivatives are significant
-        fits = fits.without(list(measurement.coarse_torques))  # rounding is not white noise
+        # rounding is not white noise
+        fits = fits.without(list(measurement.coarse_torques)).loaded()
         found = find_lengths(fits)
         if found is None or found.gain < (LEAST_COARSE if measurement.coarse else LEAST):
             return
