@@ -353,6 +353,12 @@ class JointFit:
             first += own.shape[1]
         self.torque = fits.average(fits.torque)
 
+    def changing(self, changed: Sequence[int]) -> JointFit:
+        """The same fit, in which the torque of other joints is changed."""
+        other = copy(self)
+        other.changed = list(changed)
+        return other
+
     def moved(self, signals: Signals) -> JointFit:
         """The same coefficients for another motion, whose residual :meth:`left` gives."""
         other = copy(self)
@@ -382,7 +388,9 @@ class JointFit:
             carried = (place >= len(self.base)) & (place < len(self.base) + len(loads))
             loads[place[carried] - len(self.base)] = fit.coefficients[carried]
         rigid = robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=parameters)
-        for run, load in zip(np.unique(self.number)[1:], loads.reshape(-1, len(LOAD)), strict=False):
+        for run, load in zip(
+            np.unique(self.number)[1:], loads.reshape(-1, len(LOAD)), strict=False
+        ):
             rows = np.repeat(self.number == run, SAMPLES)
             carried_only = np.zeros((robot.n_bodies, 10))
             carried_only.flat[10 * robot.n_bodies + LOAD] = load

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array
 from skidyn.effects import Effect, get_effect, searched_kinds
 from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._near_bodies import (

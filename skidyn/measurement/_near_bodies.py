@@ -99,7 +99,9 @@ class NearBodies:
         self.places: list[NDArray[np.int64]] = []
         self.targets: list[Array] = []
         self.positive: list[int] = []
-        for first, j in zip(stated.size + 4 * np.arange(len(self.joints)), self.joints, strict=True):
+        for first, j in zip(
+            stated.size + 4 * np.arange(len(self.joints)), self.joints, strict=True
+        ):
             column, sign = read[j]
             torque, use = fits.mean_torque(column)
             y, own = torque[use], gains[column] * regressor[use, j]

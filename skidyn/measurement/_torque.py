@@ -16,11 +16,13 @@ from skidyn.measurement._delay import Delay, RunDelay, find_delay, lag_gain, ref
 from skidyn.measurement._drift import Drift, find_drift
 from skidyn.measurement._fits import Fits, Reading, friction
 from skidyn.measurement._late_motion import LateMotion, find_late_motion
+from skidyn.measurement._late_run import LateRun, find_late_run
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
 from skidyn.measurement._robust import fit_admissible
+from skidyn.measurement._score import Score
 from skidyn.measurement._suspicion import Certainty, Suspicion
 
 #: Share of the largest torque below zero that a magnitude may reach, and reversals it must see.
@@ -417,17 +419,14 @@ class TorqueDelay(Check):
             yield self._drifting(found, drift)
             return
         odd = late_runs(found)
-        if max((one.gain for one in odd.values()), default=0.0) < found.gains[late_joints(found)].sum():
+        if (
+            max((one.gain for one in odd.values()), default=0.0)
+            < found.gains[late_joints(found)].sum()
+        ):
             odd = {}  # one joint is late in all of them, and felt more in some
         for run, one in odd.items():
-            yield self.suspicion(
-                f"in trajectory {run} torque is {'late' if one.lag > 0 else 'early'} by about "
-                f"{abs(1e3 * one.lag):.0f} ms relative to the others",
-                f"at that lag it is explained better by {one.gain:.0f} (log-likelihood), "
-                f"{one.agreeing:.0%} of which is on joints that agree; fix that file, or leave it "
-                "out",
-                "suspected",
-            )
+            gained = f"{one.gain:.0f} (log-likelihood), {one.agreeing:.0%} of which is on joints"
+            yield self._late_run(run, one.lag, f"{gained} that agree")
         if odd:
             return
         # a joint whose own lag is uncertain agrees with any
@@ -440,7 +439,12 @@ class TorqueDelay(Check):
         early = measurement.late_position
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
             return
-        moved = _late_motion(measurement, fits, found)
+        score = Score(fits)
+        run = find_late_run(score)
+        if run is not None and _is_late(run):
+            yield self._late_run(run.run, run.lag, f"{run.gain:.0f} (log-likelihood)")
+            return
+        moved = _late_motion(measurement, score, found)
         if moved is not None:
             of_torque = moved.gain <= moved.own_gain + LEAST
             told = self._late_torque if of_torque else self._late_motion
@@ -488,6 +492,15 @@ class TorqueDelay(Check):
             return
         yield from self._of_joints(measurement, fits, found)
 
+    def _late_run(self, run: int, lag: float, gained: str) -> Suspicion:
+        """A recording with late torque."""
+        return self.suspicion(
+            f"in trajectory {run} torque is {'late' if lag > 0 else 'early'} by about "
+            f"{abs(1e3 * lag):.0f} ms relative to the others",
+            f"at that lag it is explained better by {gained}; fix that file, or leave it out",
+            "suspected",
+        )
+
     def _drifting(self, found: Delay, drift: Drift | None) -> Suspicion:
         """Clocks with different rates."""
         fitted, remedy = "", None
@@ -522,9 +535,7 @@ class TorqueDelay(Check):
                 continue
             yield self._late_joint(measurement, found, k, lag)
 
-    def _late_joint(
-        self, measurement: Measurement, found: Delay, k: int, lag: float
-    ) -> Suspicion:
+    def _late_joint(self, measurement: Measurement, found: Delay, k: int, lag: float) -> Suspicion:
         """Torque of one joint that is late or early."""
         lag = float(f"{_whole(measurement, lag):.5f}")
         slow, fast = 1e3 * found.halves[k]
@@ -612,11 +623,16 @@ def _lowpass(fits: Fits, lag: float, late: Sequence[int], least: float = LIKELIE
     return constant if gain > least else None
 
 
-def _late_motion(measurement: Measurement, fits: Fits, found: Delay) -> LateMotion | None:
+def _is_late(run: LateRun) -> bool:
+    """Whether the lag of a recording is large, and not that of all of them."""
+    return abs(run.lag) > APART and run.gain > max(SURE, run.common_gain + LEAST)
+
+
+def _late_motion(measurement: Measurement, score: Score, found: Delay) -> LateMotion | None:
     """A single joint whose motion is late; None if a lag of torques explains as much."""
     if measurement.of_servos:
         return None  # the torque of servos follows from this motion
-    moved = find_late_motion(fits, found.common)
+    moved = find_late_motion(score, found.common)
     if moved is None or abs(moved.lag) < 2 * _least_lag(measurement):
         return None
     late = late_joints(found)
