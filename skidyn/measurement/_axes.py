@@ -20,7 +20,7 @@ from skidyn.measurement._duel import duel_of
 from skidyn.measurement._fits import Fits, Outcome, Reading
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._near_bodies import NearBodies
-from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, HALF, MOST_ROWS, NEEDED
+from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, HALF, MOST_ROWS, NEEDED, WEAKEST
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes
 from skidyn.robots import Robot
@@ -165,9 +165,10 @@ def find_axes(fits: Fits) -> list[Axis]:
         there, after = other.nominal(Reading()), other.identified(Reading())
         gain, drop = _gained(here, there)
         confirmed, own = _gained(before, after)
+        joint = int(tree.coordinates[body])
         stated = gain >= SURE and drop >= HALF and confirmed >= DECISIVE
-        if stated or (gain > 0 and confirmed >= CONFIRMED and own >= HALF):
-            joint = int(tree.coordinates[body])
+        decided = gain >= WEAKEST and confirmed >= CONFIRMED and own >= HALF
+        if stated or (decided and after.margin(before)[joint] >= 0):
             found.append(Axis(joint, direction, other, gain, confirmed, max(drop, own)))
     most = max((axis.total for axis in found), default=0.0)
     return sorted(

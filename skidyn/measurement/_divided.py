@@ -89,10 +89,17 @@ class DividedRecordings(Check):
         if seen is None or seen.errors[1].max() < WORTH:
             return
         fits = seen.fits
-        found = [*_divided_torques(fits, seen.joints), *_divided_zeros(fits)]
+        # a zero of the last joint is a load of these recordings, which has more coefficients
+        zeros = list(_divided_zeros(fits.loaded()))
+        if not zeros and fits.loaded() is not fits:
+            zeros = list(_divided_zeros(fits))
+        found = [*_divided_torques(fits, seen.joints), *zeros]
         if not found:
             return
         best = max(found, key=lambda one: one.gain)
+        if len(best.runs) == 1:
+            measurement.one_zero = best  # for the check of single recordings
+            return
         if sum(c.gain for c in asked_changes(measurement, fits) if not c.other) > best.gain:
             return
         measurement.odd = True
@@ -252,7 +259,7 @@ def _two_groups(multiples: Array) -> tuple[NDArray[np.bool_], float] | None:
 
 
 def _divided_zeros(fits: Fits) -> Iterator[Division]:
-    """A joint whose position has one of two zeros."""
+    """A joint whose position has one of two zeros, or another one in a single recording."""
     number, runs = _runs_of(fits)
     turning = np.flatnonzero(~fits.signals.prismatic).tolist()
     if len(runs) < RECORDINGS or not turning:
@@ -310,11 +317,11 @@ def _unlike_effects(
 
 
 def _best_group(n: int, likelihoods: Callable[[list[list[int]]], Array]) -> tuple[float, list[int]]:
-    """The likeliest group of a third to half of n recordings, by their numbers from 0.
+    """The likeliest group of up to half of n recordings, by their numbers from 0.
 
     Of many recordings not all groups are tried, but from a group those with one more or one fewer.
     """
-    sizes = range(int(np.ceil(SHARE * n)), n // 2 + 1)
+    sizes = range(1, n // 2 + 1)
     if sum(comb(n, size) for size in sizes) <= MOST_GROUPS:
         groups = [list(group) for size in sizes for group in combinations(range(n), size)]
         values = likelihoods(groups)
@@ -322,11 +329,10 @@ def _best_group(n: int, likelihoods: Callable[[list[list[int]]], Array]) -> tupl
     group: list[int] = []
     value = -np.inf
     while True:
-        least = min(sizes.start, len(group) + 1)
         groups = [sorted({k} ^ set(group)) for k in range(n)]
-        groups = [g for g in groups if least <= len(g) < sizes.stop]
+        groups = [g for g in groups if len(g) in sizes]
         values = likelihoods(groups)
-        if len(group) >= sizes.start and values.max() <= value:
+        if group and values.max() <= value:
             return value, group
         value, group = float(values.max()), groups[int(np.argmax(values))]
 
@@ -365,8 +371,7 @@ def _likelihoods(
 
 def _with_positions(fits: Fits, q: Array) -> Fits:
     """The same rows with other positions, (n_samples, n_joints)."""
-    moved = fits.signals.with_(q=q)
-    return Fits(fits.robot, moved, fits.torque, fits.moving, fits.recorded, fits.left_out)
+    return fits.with_motion(fits.signals.with_(q=q))
 
 
 def _spread(values: Array) -> float:

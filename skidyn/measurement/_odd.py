@@ -132,6 +132,10 @@ class OddRecording(Check):
             if zero is not None:
                 shifted[worst.run] = zero
                 unlike = [one for one in unlike if one.run != worst.run]
+        one = measurement.one_zero
+        if one is not None and not scaled and not shifted:
+            shifted = {one.runs[0]: (one.joint, one.value, one.gain)}
+            unlike = [other for other in unlike if other.run != one.runs[0]]
         if shifted or scaled:
             # a wrong reading of all recordings may affect one most
             asked = sum(c.gain for c in asked_changes(measurement, seen.fits) if not c.other)
@@ -142,7 +146,7 @@ class OddRecording(Check):
             yield self.suspicion(
                 f"in trajectory {run} the zero of {measurement.joint(joint)} differs by about "
                 f"{np.rad2deg(angle):.0f} deg from that of the others",
-                "with this correction, the bodies of the others explain the torques of that "
+                "with this correction, common bodies explain the torques of that "
                 f"trajectory better by {gain:.0f} (log-likelihood); fix that file, or leave it out",
                 "suspected",
                 [joint],
