@@ -181,7 +181,7 @@ class Fits:
     _felt: dict[Reading, list[tuple[Array, NDArray[np.int64]]]] = field(
         default_factory=dict, repr=False
     )
-    _loaded: Fits | None = field(default=None, repr=False)
+    _loaded: dict[Reading, Fits] = field(default_factory=dict, repr=False)
 
     @property
     def n_joints(self) -> int:
@@ -221,8 +221,8 @@ class Fits:
         kept = {f.name: getattr(self, f.name) for f in fields(self) if not f.name.startswith("_")}
         return Fits(**{**kept, **changes})
 
-    def loaded(self) -> Fits:
-        """The same rows, with loads where these explain far more than chance.
+    def loaded(self, reading: Reading | None = None) -> Fits:
+        """The same rows, with loads where these explain far more than chance in a reading.
 
         A load of a recording, as of a workpiece, is larger than most mistakes; identified bodies
         that are common to all recordings would leave it as a residual in which they are lost.
@@ -230,15 +230,20 @@ class Fits:
         count = n_loads(self.signals.trajectory)
         if self.loads or not count:
             return self
-        if self._loaded is None:
-            other = self._anew(loads=True)
-            gain = float(other.identified(Reading()).margin(self.identified(Reading())).sum())
-            self._loaded = other if gain > LOADED * count else self
-        return self._loaded
+        reading = reading or Reading()
+        if reading not in self._loaded:
+            other = self.with_loads()
+            gain = float(other.identified(reading).margin(self.identified(reading)).sum())
+            self._loaded[reading] = other if gain > LOADED * count else self
+        return self._loaded[reading]
+
+    def with_loads(self) -> Fits:
+        """The same rows, with loads in any case."""
+        return self._anew(loads=True)
 
     def with_torque(self, torque: Array) -> Fits:
         """The same rows with another torque, (n_samples, n_joints); what motion implies is kept."""
-        return replace(self, torque=torque, _fewer={}, _known={}, _fitted={}, _loaded=None)
+        return replace(self, torque=torque, _fewer={}, _known={}, _fitted={}, _loaded={})
 
     def with_motion(self, signals: Signals) -> Fits:
         """The same rows and torque with another motion."""

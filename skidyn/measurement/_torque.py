@@ -46,6 +46,9 @@ SMALLEST_COARSE = 0.01
 #: How many standard errors lags in the halves of recordings must differ by: that there is a lag is
 #: known then.
 DRIFTING = 3.0
+#: Least difference of these lags, s, and in standard errors, from which a growing lag is fitted to
+#: all joints together, which decides.
+DRIFTED, TRIED = 1.5e-3, 2.0
 #: Share of the joints whose lags must be alike, or of what they gain; friction shifts each joint by
 #: another amount.
 AGREEING = 0.75
@@ -676,7 +679,9 @@ def _drift(measurement: Measurement, fits: Fits, found: Delay) -> Drift | None:
 
     Where positions jump, trajectories were cut that a file does not separate.
     """
-    if not abs(found.late - found.early) > _least_lag(measurement) or len(measurement.leaps):
+    apart = abs(found.late - found.early)
+    least = SMALLEST_COARSE if measurement.coarse else DRIFTED
+    if not apart > max(least, TRIED * found.drift_error) or len(measurement.leaps):
         return None
     drift = find_drift(fits, found)
     if drift is None or drift.gain < SURE:
