@@ -176,6 +176,7 @@ class Fits:
     _known: dict[Reading, Outcome] = field(default_factory=dict, repr=False)
     _moved: dict[Reading, Array] = field(default_factory=dict, repr=False)
     _rubbed: dict[Reading, list[Array]] = field(default_factory=dict, repr=False)
+    _carried: dict[Reading, Array] = field(default_factory=dict, repr=False)
     _parts: dict[Reading, tuple[Array, Array]] = field(default_factory=dict, repr=False)
     _fitted: dict[tuple[Any, ...], RobustFit] = field(default_factory=dict, repr=False)
     _felt: dict[Reading, list[tuple[Array, NDArray[np.int64]]]] = field(
@@ -352,6 +353,8 @@ class Fits:
             joints, columns, signs = (np.array(x) for x in zip(*new, strict=True))
             own = self.columns(motion)[:, :, joints].transpose(2, 0, 1)
             y, use = (signs * self._mean_torque[:, columns]).T, self.moving[:, columns].T
+            if self.loads:
+                own, y = self._beside_loads(motion, joints, own, y, use)
             found = (
                 fit_at_once(own, y, use)
                 if rounds == 1
@@ -362,6 +365,33 @@ class Fits:
             for key, fit in zip(new, found, strict=True):
                 self._fitted[motion, *key, rounds] = fit
         return [self._fitted[motion, *key, rounds] for key in read]
+
+    def _beside_loads(
+        self,
+        motion: Reading,
+        joints: NDArray[np.int64],
+        own: Array,
+        y: Array,
+        use: NDArray[np.bool_],
+    ) -> tuple[Array, Array]:
+        """Columns and torques of joints without what a load of single recordings follows of them.
+
+        Stated bodies have no common fit of all joints, so each of these has a load of its own.
+        """
+        if motion not in self._carried:
+            while len(self._carried) >= KEPT:
+                del self._carried[next(iter(self._carried))]
+            robot, s = self._robot(motion), self.motion(motion)
+            felt = self.mean_regressor(robot, s, 10 * robot.n_bodies + LOAD)
+            self._carried[motion] = felt
+        felt, number = self._carried[motion], self.signals.trajectory[::SAMPLES]
+        own, y = own.copy(), y.copy()
+        for i, j in enumerate(joints.tolist()):
+            load = by_recording(felt[:, j], number)[use[i]]
+            basis = _span(np.column_stack([load, np.ones(len(load))]))
+            for values in (own[i], y[i]):
+                values[use[i]] -= basis @ (basis.T @ values[use[i]])
+        return own, y
 
     def offset(self, reading: Reading) -> float:
         """Largest median difference from the stated bodies, in units of the scale of the residual.
@@ -609,6 +639,15 @@ def by_recording(columns: Array, number: NDArray[np.int64]) -> Array:
     runs = np.unique(number) if n_loads(number) else number[:1]
     rows = [(number == run)[:, None] for run in runs[1:]]
     return np.hstack([columns * own for own in rows]) if rows else columns[:, :0]
+
+
+def _span(columns: Array) -> Array:
+    """Orthonormal columns that span the same, by the small matrix of their products."""
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns[:, size > 0] / size[size > 0]
+    values, vectors = np.linalg.eigh(columns.T @ columns)
+    kept = values > 1e-8 * values[-1]
+    return np.asarray(columns @ (vectors[:, kept] / np.sqrt(values[kept])))
 
 
 def friction(signals: Signals, joint: int) -> Array:

@@ -122,7 +122,9 @@ def find_changes(fits: Fits) -> list[Change]:
     found: list[Change] = []
     fitted: list[int] = []
     reading = Reading()
+    rows = fits
     while len(found) < 2 * fits.n_joints:
+        fits = rows.loaded(reading)
         best = _best(fits, reading)
         if best is None:
             break

@@ -369,7 +369,7 @@ def _one_of_two(told: Suspicion, changes: Iterable[Change]) -> Suspicion:
 def asked_changes(measurement: Measurement, fits: Fits) -> list[Change]:
     """Changes to the reading of all recordings that the measurement implies."""
     if measurement.changes is None:
-        measurement.changes = find_changes(fits.without(_lost_columns(measurement)).loaded())
+        measurement.changes = find_changes(fits.without(_lost_columns(measurement)))
     return measurement.changes
 
 
