@@ -16,6 +16,7 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._bodies import explained
 from skidyn.measurement._check import Check
+from skidyn.measurement._divided import divided_zeros
 from skidyn.measurement._duel import duel_of
 from skidyn.measurement._fits import Fits, Outcome, Reading
 from skidyn.measurement._measurement import Measurement
@@ -90,6 +91,9 @@ class Axes(Check):
         duel = duel_of(here, there, range(fits.n_joints))
         if duel.beside < (LEAST if found.confirmed > CONFIRMED else max(LEAST, BESIDE * duel.gain)):
             return
+        # so may another zero in some of the recordings
+        if any(zero.gain > found.confirmed for zero in divided_zeros(seen.fits)):
+            return
         measurement.odd = True
         words = _words(found.direction)
         same = "".join(
@@ -148,7 +152,7 @@ def find_axes(fits: Fits) -> list[Axis]:
     robot, tree = fits.robot, fits.robot.tree
     if len(tree.parents) != robot.n_joints:
         return []  # bodies of mimic joints have no separate columns
-    few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+    few = fits.with_loads(False).thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
     rough = few.nominal(Reading(), 1)
     every = np.vstack([np.eye(3), -np.eye(3)])
     tried: list[tuple[float, int, int, Array]] = []

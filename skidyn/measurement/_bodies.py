@@ -15,6 +15,7 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._crosstalk import find_shares
 from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading, friction, lines_between
 from skidyn.measurement._gains import Scales, refined_scales
+from skidyn.measurement._joint_gravity import without_gravity
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._peak import peak
 from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, MOST_ROWS
@@ -243,6 +244,8 @@ class TorqueScale(Check):
                     [k],
                     _gain_remedy({k: float(f"{1 / (_unit_like(gain) or gain):.3g}")}),
                 )
+        if found:  # gravity that was removed from one torque makes it small, too
+            found = {k: found[k] for k in set(found) - set(without_gravity(measurement, fits))}
         told, evidence = ", ".join(f"{gains[k]:.3g}" for k in found), []
         if found:
             fitted = ", ".join(f"{gain:.3g}" for gain in found.values())
@@ -273,7 +276,14 @@ class TorqueScale(Check):
             units |= dict.fromkeys(beyond, KILO)
             refined = {k: gain for k, gain in found.items() if k not in units}
             factors = {k: 1 / unit for k, unit in units.items()}
-            factors |= refined_scales(fits, units, refined).factors if refined else {}
+            if refined:
+                scales = refined_scales(fits, units, refined)
+                # of two torques, each is at another scale than the other
+                usual = {k for k, gain in scales.gains.items() if CLEARLY[0] < gain < CLEARLY[1]}
+                if usual and len(usual) < len(refined):
+                    refined = {k: gain for k, gain in refined.items() if k not in usual}
+                    scales = refined_scales(fits, units, refined)
+                factors |= scales.factors
             joints = sorted(factors)
             yield self.suspicion(
                 f"the torque of {', '.join(measurement.joint(k) for k in joints)} has a different "

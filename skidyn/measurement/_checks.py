@@ -160,6 +160,7 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
         told = list(check.look(measurement))
         found += told
         doubted = any(s.certainty != "noted" for s in told)
+        measurement.dead |= check.name == "dead_band" and doubted
         measurement.scaled |= check.name == "torque_scale" and doubted
         measurement.smoothed |= check.name == "smoothed_torque" and doubted
         if check in _UNITS and any(s.certainty == "certain" for s in told):

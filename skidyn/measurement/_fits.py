@@ -238,9 +238,9 @@ class Fits:
             self._loaded[reading] = other if gain > LOADED * count else self
         return self._loaded[reading]
 
-    def with_loads(self) -> Fits:
-        """The same rows, with loads in any case."""
-        return self._anew(loads=True)
+    def with_loads(self, loads: bool = True) -> Fits:
+        """The same rows, with loads in any case, or without."""
+        return self if self.loads == loads else self._anew(loads=loads)
 
     def with_torque(self, torque: Array) -> Fits:
         """The same rows with another torque, (n_samples, n_joints); what motion implies is kept."""

@@ -79,6 +79,7 @@ def refined_scales(fits: Fits, gains: Mapping[int, float], free: Mapping[int, fl
         Scales that are refined, as far as they are known; the torques of other joints are at those
         of ``gains``.
     """
+    fits = fits.with_loads(False)  # which are columns of their own here
     inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
     now = np.ones(fits.n_joints)
     for k, gain in {**gains, **free}.items():

@@ -68,7 +68,7 @@ class Measurement:
         have an even clock.
     unsigned, changes, delay, copies, servos, late_position, readable, stale, lost, odd : optional
         Results of checks that are used by other checks; set by them.
-    one_zero, scaled, smoothed, computed, frictionless, mixed : optional
+    one_zero, dead, scaled, smoothed, computed, frictionless, mixed : optional
         Results of checks that are used by other checks; set by them.
     clock : float, optional
         Number of units of the clock in a second; set by its check.
@@ -103,6 +103,7 @@ class Measurement:
     lost: bool = field(default=False, repr=False)
     odd: bool = field(default=False, repr=False)
     one_zero: Division | None = field(default=None, repr=False)
+    dead: bool = field(default=False, repr=False)
     scaled: bool = field(default=False, repr=False)
     smoothed: bool = field(default=False, repr=False)
     computed: bool = field(default=False, repr=False)

@@ -19,7 +19,7 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd_order import find_exchanges
 from skidyn.measurement._robust import robust_likelihood, student
 from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._torque import asked_changes
+from skidyn.measurement._torque import asked_gain
 
 #: Fewest rows of a recording to be judged.
 FEWEST = 12
@@ -138,7 +138,7 @@ class OddRecording(Check):
             unlike = [other for other in unlike if other.run != one.runs[0]]
         if shifted or scaled:
             # a wrong reading of all recordings may affect one most
-            asked = sum(c.gain for c in asked_changes(measurement, seen.fits) if not c.other)
+            asked = asked_gain(measurement, seen.fits)
             shifted = {run: zero for run, zero in shifted.items() if zero[2] > asked}
             scaled = [one for one in scaled if one.gain > asked]
         measurement.odd = bool(scaled or unlike or shifted)

@@ -373,6 +373,12 @@ def asked_changes(measurement: Measurement, fits: Fits) -> list[Change]:
     return measurement.changes
 
 
+def asked_gain(measurement: Measurement, fits: Fits) -> float:
+    """Log-likelihood gain of these changes with stated or with identified bodies."""
+    asked = [c for c in asked_changes(measurement, fits) if not c.other]
+    return max(sum(c.gain for c in asked), sum(c.confirmed for c in asked))
+
+
 def _sure(changes: Iterable[Change]) -> bool:
     """Whether every change gains much, and takes off most of what the log as it is leaves."""
     return all(
@@ -443,7 +449,7 @@ class TorqueDelay(Check):
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
             return
         score = Score(fits)
-        run = find_late_run(score)
+        run = None if measurement.dead else find_late_run(score)
         if run is not None and _is_late(run):
             yield self._late_run(run.run, run.lag, f"{run.gain:.0f} (log-likelihood)")
             return
@@ -636,7 +642,11 @@ def _late_motion(measurement: Measurement, score: Score, found: Delay) -> LateMo
     if measurement.of_servos:
         return None  # the torque of servos follows from this motion
     moved = find_late_motion(score, found.common)
-    if moved is None or abs(moved.lag) < 2 * _least_lag(measurement):
+    if moved is None:
+        return None
+    # positions in steps have errors that are not independent from row to row
+    coarse = measurement.coarse or np.isfinite(measurement.position_steps[moved.joint])
+    if abs(moved.lag) < 2 * (SMALLEST_COARSE if coarse else SMALLEST):
         return None
     late = late_joints(found)
     if moved.joint in late:
