@@ -491,7 +491,8 @@ class UnexplainedTorque(Check):
         seen = explained(measurement)
         if seen is None or measurement.stale or measurement.frictionless:
             return  # rough derivatives, or another friction, are no other signal
-        least = np.minimum(*seen.errors)
+        carried = seen.fits.loaded().identified(Reading()).scale[seen.joints] / seen.spread
+        least = np.minimum(np.minimum(*seen.errors), carried)  # a load is no other signal
         steady = seen.scatter / np.sqrt(6)  # white noise is not an error of the log
         bad: NDArray[np.bool_] = (least > UNRELATED) & (least > BEYOND * steady)
         unlike = [k for k, found in zip(seen.joints, bad, strict=True) if found]

@@ -441,3 +441,15 @@ def divided_differences(values: np.ndarray, time: np.ndarray, order: int) -> np.
     weights /= np.sqrt(np.sum(weights**2, axis=0))
     shape = (n, *(1,) * (values.ndim - 1))
     return np.asarray(sum(w.reshape(shape) * values[k : n + k] for k, w in enumerate(weights)))
+
+
+def is_short(values: np.ndarray) -> bool:
+    """Whether all values are numbers of half precision, eleven binary digits.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_samples,)
+    """
+    if np.abs(values).max() > 6e4 or np.any(values != values.astype(np.float16)):
+        return False
+    return len(np.unique(values)) >= 50

@@ -178,9 +178,10 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             if kept > -TIED:
                 return replace(absent, restorable=restored > LEAST)
             judged = [c for c in judged if c.kind != "gravity"]
-    restored_change = _restored(fits, reading, here) if judged and reading.gravity is None else None
-    if restored_change is not None:
-        return restored_change
+    if (judged or fits.loads) and reading.gravity is None:
+        restored_change = _restored(fits, reading, here)
+        if restored_change is not None:
+            return restored_change
     accepted = []
     for change in judged:
         if change.kind == "no_gravity":

@@ -19,7 +19,7 @@ from skidyn.measurement._late_motion import LateMotion, find_late_motion
 from skidyn.measurement._late_run import LateRun, find_late_run
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import reversals
+from skidyn.measurement._measures import is_short, reversals
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
 from skidyn.measurement._robust import fit_admissible
 from skidyn.measurement._score import Score
@@ -645,7 +645,9 @@ def _late_motion(measurement: Measurement, score: Score, found: Delay) -> LateMo
     if moved is None:
         return None
     # positions in steps have errors that are not independent from row to row
-    coarse = measurement.coarse or np.isfinite(measurement.position_steps[moved.joint])
+    k = moved.joint
+    coarse = measurement.coarse or np.isfinite(measurement.position_steps[k])
+    coarse |= is_short(measurement.signals.q[:, k])
     if abs(moved.lag) < 2 * (SMALLEST_COARSE if coarse else SMALLEST):
         return None
     late = late_joints(found)
