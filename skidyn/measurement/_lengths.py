@@ -81,8 +81,7 @@ class Lengths(Check):
             return
         if measurement.torque_scatter < NOISELESS:
             return  # without noise, errors of the derivatives are significant
-        # rounding is not white noise
-        fits = fits.without(list(measurement.coarse_torques)).loaded()
+        fits = fits.without(list(measurement.coarse_torques))  # rounding is not white noise
         found = find_lengths(fits)
         if found is None or found.gain < (LEAST_COARSE if measurement.coarse else LEAST):
             return

@@ -47,7 +47,7 @@ SMALLEST_COARSE = 0.01
 #: known then.
 DRIFTING = 3.0
 #: Least difference of these lags, s, and in standard errors, from which a growing lag is fitted to
-#: all joints together, which decides.
+#: all joints together, which decides, if it is less than the smallest lag that is reported.
 DRIFTED, TRIED = 1.5e-3, 2.0
 #: Share of the joints whose lags must be alike, or of what they gain; friction shifts each joint by
 #: another amount.
@@ -692,8 +692,10 @@ def _drift(measurement: Measurement, fits: Fits, found: Delay) -> Drift | None:
     Where positions jump, trajectories were cut that a file does not separate.
     """
     apart = abs(found.late - found.early)
-    least = SMALLEST_COARSE if measurement.coarse else DRIFTED
-    if not apart > max(least, TRIED * found.drift_error) or len(measurement.leaps):
+    least = _least_lag(measurement)
+    if not measurement.coarse:
+        least = min(least, max(DRIFTED, TRIED * found.drift_error))
+    if not apart > least or len(measurement.leaps):
         return None
     drift = find_drift(fits, found)
     if drift is None or drift.gain < SURE:
