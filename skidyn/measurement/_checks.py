@@ -47,7 +47,8 @@ from skidyn.measurement._overflow import OverflowedTorque
 from skidyn.measurement._slow_torque import SlowTorque
 from skidyn.measurement._smoothing import SmoothedTorque
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
-from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
+from skidyn.measurement._torque import Columns, UnsignedTorque
+from skidyn.measurement._torque_delay import TorqueDelay
 from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
 from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDelay
 

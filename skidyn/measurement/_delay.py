@@ -11,16 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
-from skidyn.measurement._fits import (
-    LOAD,
-    SAMPLES,
-    Fits,
-    Reading,
-    by_recording,
-    friction,
-    lines_between,
-    n_loads,
-)
+from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction, lines_between
+from skidyn.measurement._loads import LOAD, by_recording, n_loads
 from skidyn.measurement._peak import peak
 from skidyn.measurement._robust import FEWEST, RobustFit, fit_together
 from skidyn.robots import base_parameter_index

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
-from skidyn.evidence import REST, smooth_motion
+from skidyn.measurement._loads import LOAD, by_recording, n_loads, span
 from skidyn.measurement._robust import (
     FEWEST,
     ROUNDS,
@@ -32,14 +32,10 @@ from skidyn.robots import Robot, base_parameter_index, with_whole_turns
 
 #: Nodes of a function of the position.
 PLACES = 8
-#: Width of a row in s and the samples in it; most rows used, over all intervals of the log.
-WIDTH, SAMPLES, MOST_ROWS = 0.125, 6, 1200
+#: Samples in a row.
+SAMPLES = 6
 #: Columns of a joint in addition to those of the bodies: friction, rotor inertia and a constant.
 OWN = 4
-#: Parameters of the last body of which a load consists, its mass and first moments, from the end;
-#: numbers of recordings that may carry loads of their own.
-LOAD = np.arange(-10, -6)
-FEW_RUNS, MOST_RUNS = 1, 8
 #: Log-likelihood that every coefficient of a load must gain on average: half the logarithm of some
 #: 150 rows, twice.
 LOADED = 5.0
@@ -388,7 +384,7 @@ class Fits:
         own, y = own.copy(), y.copy()
         for i, j in enumerate(joints.tolist()):
             load = by_recording(felt[:, j], number)[use[i]]
-            basis = _span(np.column_stack([load, np.ones(len(load))]))
+            basis = span(np.column_stack([load, np.ones(len(load))]))
             for values in (own[i], y[i]):
                 values[use[i]] -= basis @ (basis.T @ values[use[i]])
         return own, y
@@ -615,41 +611,6 @@ class Fits:
         return Outcome(likelihood, np.full(n, np.nan), residual, scale, of)
 
 
-def n_loads(number: NDArray[np.int64]) -> int:
-    """Number of coefficients of loads of single recordings; none in one, or in many recordings."""
-    n = len(np.unique(number))
-    return len(LOAD) * (n - 1) if FEW_RUNS < n <= MOST_RUNS else 0
-
-
-def by_recording(columns: Array, number: NDArray[np.int64]) -> Array:
-    """Columns of every recording but the first, of a load that differs between them.
-
-    Parameters
-    ----------
-    columns : ndarray of shape (n_rows, n_columns)
-        Columns of the mass and first moments of the last body.
-    number : ndarray of shape (n_rows,)
-        Recording of every row.
-
-    Returns
-    -------
-    ndarray of shape (n_rows, n_columns * (n_recordings - 1))
-        None for a single recording, or for more than may carry loads of their own.
-    """
-    runs = np.unique(number) if n_loads(number) else number[:1]
-    rows = [(number == run)[:, None] for run in runs[1:]]
-    return np.hstack([columns * own for own in rows]) if rows else columns[:, :0]
-
-
-def _span(columns: Array) -> Array:
-    """Orthonormal columns that span the same, by the small matrix of their products."""
-    size = np.linalg.norm(columns, axis=0)
-    columns = columns[:, size > 0] / size[size > 0]
-    values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = values > 1e-8 * values[-1]
-    return np.asarray(columns @ (vectors[:, kept] / np.sqrt(values[kept])))
-
-
 def friction(signals: Signals, joint: int) -> Array:
     """Columns of viscous and dry friction and of rotor inertia of a joint."""
     dq = signals.dq[:, joint]
@@ -675,60 +636,3 @@ def lines_between(position: Array) -> Array:
     """
     nodes = np.unique(np.quantile(position, np.linspace(0, 1, PLACES)))
     return np.stack([np.interp(position, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
-
-
-def smoothed(signals: Signals) -> Signals:
-    """Smoothed motion of a recording, computed once for all checks."""
-    motion: Signals = signals.once("smooth motion", lambda: smooth_motion(signals))
-    return motion
-
-
-def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
-    """Rows of a measurement; None if no interval of it is long enough.
-
-    Parameters
-    ----------
-    signals : Signals
-        Recorded motion.
-    torque : ndarray of shape (n_samples, n_joints), N m or N
-        Recorded torque.
-    robot : Robot
-        As described.
-    """
-    motion = smoothed(signals)
-    every = max(1, round(motion.rate * WIDTH / SAMPLES))
-    mean = running_mean(torque, every | 1)  # an even number would be half a sample late
-    parts = []
-    for rows in signals.segments:
-        edge = max(2, motion.half_width // 2) + every
-        picked = np.arange(rows.start + edge, rows.stop - edge, every)
-        parts.append(picked[: len(picked) // SAMPLES * SAMPLES].reshape(-1, SAMPLES))
-    blocks = np.concatenate(parts) if parts else np.zeros((0, SAMPLES), dtype=int)
-    if len(blocks) < FEWEST:
-        return None
-    if len(blocks) > MOST_ROWS:  # intervals of rows from all parts of the log
-        blocks = blocks[_stretches(len(blocks))]
-    rows_used = blocks.ravel()
-    taken = motion.take(rows_used).with_(robot=None)
-    slow = REST * taken.unit
-    moving = np.abs(taken.dq).reshape(-1, SAMPLES, robot.n_joints).mean(axis=1) > slow
-    recorded = Recorded(signals.clock, mean, signals.segments, rows_used)
-    return Fits(robot, taken, mean[rows_used], moving, recorded)
-
-
-def _stretches(n: int) -> NDArray[np.int64]:
-    """Rows of 24 stretches evenly over a log."""
-    length = MOST_ROWS // 24
-    starts = np.linspace(0, n - length, 24).astype(int)
-    return np.unique(starts[:, None] + np.arange(length))
-
-
-def running_mean(values: Array, width: int) -> Array:
-    """Mean around every sample; ends are not used."""
-    if width < 2:
-        return values
-    total = np.cumsum(np.vstack([np.zeros(values.shape[1]), values]), axis=0)
-    n = len(values)
-    low = np.clip(np.arange(n) - width // 2, 0, n)
-    high = np.clip(low + width, 0, n)
-    return np.asarray((total[high] - total[low]) / np.maximum(high - low, 1)[:, None])

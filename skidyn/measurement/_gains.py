@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import FEW_RUNS, MOST_RUNS, SAMPLES, Fits, Reading
+from skidyn.measurement._fits import SAMPLES, Fits, Reading
+from skidyn.measurement._loads import FEW_RUNS, MOST_RUNS
 from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies, likely_load
 
 #: Most steps, the largest one, and the one that ends them.

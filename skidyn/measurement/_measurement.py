@@ -272,7 +272,7 @@ class Measurement:
     @cached_property
     def fits(self) -> Fits | None:
         """Averaged rows to which readings of the measurement are fitted."""
-        from skidyn.measurement._fits import make_fits  # with it all columns of the evidence
+        from skidyn.measurement._rows import make_fits  # with it all columns of the evidence
 
         if self.robot is None:
             return None

@@ -295,8 +295,8 @@ def velocity_consistency(
     """Slope and correlation of integrated velocity against change of position.
 
     Both are taken over windows of 50 ms (in samples of the median step), which averages noise and
-    quantisation out. NaN where the joint does not move. A few windows are left out if all others are
-    proportional: a lost sample that is near the others is no outlier of the position.
+    quantisation out. NaN where the joint does not move. A few windows are left out if all others
+    are proportional: a lost sample that is near the others is no outlier of the position.
     """
     x, y, _ = way_and_area(time, position, velocity, segments)
     if x @ x < 1e-20 or y @ y < 1e-20:

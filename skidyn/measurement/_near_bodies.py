@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import LOAD, SAMPLES, Fits, Reading, by_recording, friction, n_loads
+from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction
+from skidyn.measurement._loads import LOAD, by_recording, n_loads
 from skidyn.measurement._robust import FREEDOM, student
 from skidyn.robots import Robot
 

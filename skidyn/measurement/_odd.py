@@ -132,10 +132,11 @@ class OddRecording(Check):
             if zero is not None:
                 shifted[worst.run] = zero
                 unlike = [one for one in unlike if one.run != worst.run]
-        one = measurement.one_zero
-        if one is not None and not scaled and not shifted:
-            shifted = {one.runs[0]: (one.joint, one.value, one.gain)}
-            unlike = [other for other in unlike if other.run != one.runs[0]]
+        zero_of_one = measurement.one_zero
+        if zero_of_one is not None and not scaled and not shifted:
+            (run,) = zero_of_one.runs
+            shifted = {run: (zero_of_one.joint, zero_of_one.value, zero_of_one.gain)}
+            unlike = [other for other in unlike if other.run != run]
         if shifted or scaled:
             # a wrong reading of all recordings may affect one most
             asked = asked_gain(measurement, seen.fits)

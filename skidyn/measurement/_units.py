@@ -343,7 +343,9 @@ def _fitted_size(
     fits = measurement.fits
     if fits is None or least < DISTANT:
         return None
-    sizes = 0.8 * least * 1.03 ** np.arange(90)  # up to a tenth of the range of the joint
+    sizes: Array = (
+        0.8 * least * np.power(1.03, np.arange(90), dtype=float)
+    )  # up to a tenth of the range of the joint
     if joints is not None:  # bodies that other joints move as well
         return _sharpened(fits, _identified_size(fits, sizes, joints)[0], joints)
     likely = np.array([fits.nominal(_sized(x, joints), 2).likelihood.sum() for x in sizes])
