@@ -36,4 +36,4 @@ from skidyn.measurement._servo_settings import (
     ServoSetting as ServoSetting,
     servo_settings as servo_settings,
 )
-from skidyn.measurement._torque import measured_delay as measured_delay
+from skidyn.measurement._torque_delay import measured_delay as measured_delay

@@ -16,11 +16,12 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._bodies import explained
 from skidyn.measurement._check import Check
+from skidyn.measurement._divided import divided_zeros
 from skidyn.measurement._duel import duel_of
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits, Outcome, Reading
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._near_bodies import NearBodies
-from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, HALF, MOST_ROWS
+from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, HALF, MOST_ROWS, NEEDED, WEAKEST
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes
 from skidyn.robots import Robot
@@ -30,6 +31,11 @@ WORTH = 0.08
 #: Least log-likelihood gain of another axis with stated bodies, and in addition to any effect;
 #: least share of it there; number of axes that are examined in detail.
 LEAST, SURE, BESIDE, FINALISTS = 15.0, 40.0, 0.3, 4
+#: What it must gain with identified bodies where stated ones hardly decide, as on a wrist, of whose
+#: torque friction is the largest part.
+CONFIRMED = 2 * DECISIVE
+#: Difference of gains up to which two axes are the same.
+TIED = 0.1
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,16 @@ class Axis:
     gain: float
     confirmed: float
     drop: float
+
+    @property
+    def total(self) -> float:
+        """Both gains."""
+        return self.gain + self.confirmed
+
+    @property
+    def likely(self) -> tuple[bool, bool]:
+        """Order of axes of equal gain: most descriptions have the z axis, in its direction."""
+        return abs(self.direction[2]) > 0.5, bool(self.direction.sum() > 0)
 
 
 class Axes(Check):
@@ -56,28 +72,42 @@ class Axes(Check):
         seen = None if measurement.stale or measurement.lost else explained(measurement)
         if seen is None or seen.errors[0].max() < WORTH:
             return
-        fits = seen.fits
-        found = find_axis(fits)
-        if found is None:
+        fits = seen.fits.loaded()
+        every = find_axes(fits)
+        if not every:
             return
+        found, *others = every
         # a sign, an order or a zero may look like another axis, and vice versa
-        if sum(c.gain for c in asked_changes(measurement, fits) if not c.other) > found.gain:
+        asked = [c for c in asked_changes(measurement, fits) if not c.other]
+        if sum(c.gain for c in asked) > found.gain and (
+            any(NEEDED[c.kind] < 0 for c in asked if c.kind in NEEDED)
+            or any(c.kind == "no_gravity" for c in asked)
+            or sum(c.gain + c.confirmed for c in asked) > found.total
+        ):
             return
         gains = np.nan_to_num(found.fits.nominal(Reading()).gain)
-        inflation = np.maximum(seen.identified.inflation, 1.0)
+        inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
         here, there = (NearBodies(f, Reading(), gains, inflation) for f in (fits, found.fits))
         duel = duel_of(here, there, range(fits.n_joints))
-        if duel.beside < max(LEAST, BESIDE * duel.gain):
+        if duel.beside < (LEAST if found.confirmed > CONFIRMED else max(LEAST, BESIDE * duel.gain)):
+            return
+        # so may another zero in some of the recordings
+        if any(zero.gain > found.confirmed for zero in divided_zeros(seen.fits)):
             return
         measurement.odd = True
-        words = " ".join(f"{x:g}" for x in found.direction)
+        words = _words(found.direction)
+        same = "".join(
+            f'; {measurement.joint(axis.joint)} about <axis xyz="{_words(axis.direction)}"/> '
+            "instead explains it equally well"
+            for axis in others
+        )
         yield self.suspicion(
             f"{measurement.joint(found.joint)} turns about a different axis than in the "
             "description",
             f'about <axis xyz="{words}"/> of its frame the rigid-body torque explains the '
             f"measured torque better by {found.gain:.0f} (log-likelihood), or by "
             f"{found.confirmed:.0f} with identified bodies, and leaves {100 * found.drop:.0f} % "
-            "less residual; use the description of this robot, or correct the axis there",
+            f"less residual{same}; use the description of this robot, or correct the axis there",
             "certain",
             [found.joint],
         )
@@ -104,8 +134,15 @@ def turned(robot: Robot, body: int, direction: Array) -> Robot:
     return replace(robot, tree=replace(robot.tree, axes=axes))
 
 
-def find_axis(fits: Fits) -> Axis | None:
+def _words(direction: Array) -> str:
+    """A direction, as in a description."""
+    return " ".join(f"{x + 0.0:g}" for x in direction)
+
+
+def find_axes(fits: Fits) -> list[Axis]:
     """The other axis of a joint that explains most, if bodies with it explain far more.
+
+    Others that explain exactly as much follow, as of two joints that are parallel about either.
 
     Parameters
     ----------
@@ -114,8 +151,8 @@ def find_axis(fits: Fits) -> Axis | None:
     """
     robot, tree = fits.robot, fits.robot.tree
     if len(tree.parents) != robot.n_joints:
-        return None  # bodies of mimic joints have no separate columns
-    few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+        return []  # bodies of mimic joints have no separate columns
+    few = fits.with_loads(False).thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
     rough = few.nominal(Reading(), 1)
     every = np.vstack([np.eye(3), -np.eye(3)])
     tried: list[tuple[float, int, int, Array]] = []
@@ -126,16 +163,25 @@ def find_axis(fits: Fits) -> Axis | None:
     here, before = fits.nominal(Reading()), fits.identified(Reading())
     found = []
     for rough_gain, _, body, direction in sorted(tried, reverse=True)[:FINALISTS]:
-        if rough_gain < LEAST:
+        if rough_gain < 0:
             break
         other = fits.of(turned(robot, body, direction))
-        there = other.nominal(Reading())
-        margin = there.margin(here)
-        drop = float((1 - there.scale / here.scale)[int(np.argmax(margin))])
-        if margin.sum() < SURE or drop < HALF:
-            continue
-        confirmed = float(other.identified(Reading()).margin(before).sum())
-        if confirmed >= DECISIVE:
-            joint = int(tree.coordinates[body])
-            found.append(Axis(joint, direction, other, float(margin.sum()), confirmed, drop))
-    return max(found, key=lambda axis: axis.gain + axis.confirmed, default=None)
+        there, after = other.nominal(Reading()), other.identified(Reading())
+        gain, drop = _gained(here, there)
+        confirmed, own = _gained(before, after)
+        joint = int(tree.coordinates[body])
+        stated = gain >= SURE and drop >= HALF and confirmed >= DECISIVE
+        decided = gain >= WEAKEST and confirmed >= CONFIRMED and own >= HALF
+        if stated or (decided and after.margin(before)[joint] >= 0):
+            found.append(Axis(joint, direction, other, gain, confirmed, max(drop, own)))
+    most = max((axis.total for axis in found), default=0.0)
+    return sorted(
+        (axis for axis in found if axis.total > most - TIED), key=lambda a: a.likely, reverse=True
+    )
+
+
+def _gained(before: Outcome, after: Outcome) -> tuple[float, float]:
+    """Gain of a fit, and the share of the residual it takes off, on the joint that gains most."""
+    margin = after.margin(before)
+    k = int(np.argmax(margin))
+    return float(margin.sum()), float(1 - after.scale[k] / before.scale[k])

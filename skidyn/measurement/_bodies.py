@@ -15,6 +15,7 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._crosstalk import find_shares
 from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading, friction, lines_between
 from skidyn.measurement._gains import Scales, refined_scales
+from skidyn.measurement._joint_gravity import without_gravity
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._peak import peak
 from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, MOST_ROWS
@@ -152,7 +153,7 @@ class TorqueScale(Check):
         gains = {k: float(g) for k, g in enumerate(here) if np.isfinite(g) and g > 0}
         values = np.array(list(gains.values()))
         sure = np.array(list(known.values()))
-        rate = _other_rate(fits, bool(odd))
+        rate = _other_rate(fits.loaded(), bool(odd))
         if rate is not None:
             value = float(f"{rate:.4g}")
             words = f"time={1 / value:.6g},dq={value:g}"
@@ -229,7 +230,7 @@ class TorqueScale(Check):
             low, high = CLEARLY if k in known else USUAL
             if low <= gain <= high or (k not in known and gain < low):
                 continue  # the multiple of a torque that bodies hardly explain is small by itself
-            own, gained, apart = joint_gain(fits, k, gain)
+            own, gained, apart = joint_gain(fits.loaded(), k, gain)
             wrong = not USUAL[0] <= gain <= USUAL[1] and k in known
             if gained > (LEAST if wrong else SURE) and apart > LEAST and not low <= own <= high:
                 found[k] = own
@@ -243,6 +244,8 @@ class TorqueScale(Check):
                     [k],
                     _gain_remedy({k: float(f"{1 / (_unit_like(gain) or gain):.3g}")}),
                 )
+        if found:  # gravity that was removed from one torque makes it small, too
+            found = {k: found[k] for k in set(found) - set(without_gravity(measurement, fits))}
         told, evidence = ", ".join(f"{gains[k]:.3g}" for k in found), []
         if found:
             fitted = ", ".join(f"{gain:.3g}" for gain in found.values())
@@ -273,7 +276,14 @@ class TorqueScale(Check):
             units |= dict.fromkeys(beyond, KILO)
             refined = {k: gain for k, gain in found.items() if k not in units}
             factors = {k: 1 / unit for k, unit in units.items()}
-            factors |= refined_scales(fits, units, refined).factors if refined else {}
+            if refined:
+                scales = refined_scales(fits, units, refined)
+                # of two torques, each is at another scale than the other
+                usual = {k for k, gain in scales.gains.items() if CLEARLY[0] < gain < CLEARLY[1]}
+                if usual and len(usual) < len(refined):
+                    refined = {k: gain for k, gain in refined.items() if k not in usual}
+                    scales = refined_scales(fits, units, refined)
+                factors |= scales.factors
             joints = sorted(factors)
             yield self.suspicion(
                 f"the torque of {', '.join(measurement.joint(k) for k in joints)} has a different "
@@ -481,7 +491,8 @@ class UnexplainedTorque(Check):
         seen = explained(measurement)
         if seen is None or measurement.stale or measurement.frictionless:
             return  # rough derivatives, or another friction, are no other signal
-        least = np.minimum(*seen.errors)
+        carried = seen.fits.loaded().identified(Reading()).scale[seen.joints] / seen.spread
+        least = np.minimum(np.minimum(*seen.errors), carried)  # a load is no other signal
         steady = seen.scatter / np.sqrt(6)  # white noise is not an error of the log
         bad: NDArray[np.bool_] = (least > UNRELATED) & (least > BEYOND * steady)
         unlike = [k for k, found in zip(seen.joints, bad, strict=True) if found]

@@ -12,7 +12,7 @@ from skidyn.evidence import broken_notes
 from skidyn.measurement._around_zero import dead_bands
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import COARSE, step_of_values
+from skidyn.measurement._measures import COARSE, is_short, step_of_values
 from skidyn.measurement._suspicion import Suspicion
 
 #: Share of rows at the extreme torque from which it is reported.
@@ -60,7 +60,7 @@ class CoarsePosition(Check):
         }
         coarse = {k: step for k, step in steps.items() if step > COARSE}
         for k in steps:
-            if k not in coarse and _is_short(q[:, k]):
+            if k not in coarse and is_short(q[:, k]):
                 # the step of eleven bits at the largest position
                 coarse[k] = 2.0 ** np.floor(np.log2(np.abs(q[:, k]).max()) - 10)
         if coarse:
@@ -72,13 +72,6 @@ class CoarsePosition(Check):
                 "noted",
                 sorted(coarse),
             )
-
-
-def _is_short(values: Array) -> bool:
-    """Whether all values are numbers of half precision, eleven binary digits."""
-    if np.abs(values).max() > 6e4 or np.any(values != values.astype(np.float16)):
-        return False
-    return len(np.unique(values)) >= 50
 
 
 class ConstantTorque(Check):

@@ -47,7 +47,8 @@ from skidyn.measurement._overflow import OverflowedTorque
 from skidyn.measurement._slow_torque import SlowTorque
 from skidyn.measurement._smoothing import SmoothedTorque
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
-from skidyn.measurement._torque import Columns, TorqueDelay, UnsignedTorque
+from skidyn.measurement._torque import Columns, UnsignedTorque
+from skidyn.measurement._torque_delay import TorqueDelay
 from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
 from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDelay
 
@@ -160,6 +161,7 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
         told = list(check.look(measurement))
         found += told
         doubted = any(s.certainty != "noted" for s in told)
+        measurement.dead |= check.name == "dead_band" and doubted
         measurement.scaled |= check.name == "torque_scale" and doubted
         measurement.smoothed |= check.name == "smoothed_torque" and doubted
         if check in _UNITS and any(s.certainty == "certain" for s in told):

@@ -308,7 +308,8 @@ def _gained_by_torque(measurement: Measurement) -> float | None:
     fits = measurement.fits
     if fits is None:
         return None
-    from skidyn.measurement._fits import Reading, make_fits  # also imports the evidence
+    from skidyn.measurement._fits import Reading
+    from skidyn.measurement._rows import make_fits  # also imports the evidence
 
     signals = measurement.whole
     even = signals.with_(time=regular_clock(signals.clock, signals.trajectory))

@@ -12,7 +12,7 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import divided_differences
 from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._torque import ERRORS, SMALLEST, measured_delay
+from skidyn.measurement._torque_delay import ERRORS, SMALLEST, measured_delay
 
 #: Order of the differences, which motion hardly reaches.
 ORDER = 6

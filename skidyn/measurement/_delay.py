@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
 from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction, lines_between
+from skidyn.measurement._loads import LOAD, by_recording, n_loads
 from skidyn.measurement._peak import peak
 from skidyn.measurement._robust import FEWEST, RobustFit, fit_together
 from skidyn.robots import base_parameter_index
@@ -34,8 +35,6 @@ FAR = 1e-3
 SLIDING = 0.05
 #: Rows that are worth one, since noise is correlated.
 CORRELATED = 2.0
-#: Numbers of recordings that may carry loads of their own.
-FEW_RUNS, MOST_RUNS = 1, 8
 #: Largest share of the torque's spread that the fit of a joint may leave for its lag to count.
 LEFT = 0.5
 
@@ -174,7 +173,7 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
         further = fits.average(lines_between(s.q[:, j]))[use]
         y = np.stack([torque[use, j] for torque in shifted], axis=1)
         shared = basis = _basis(plain)
-        wider = _basis(np.column_stack([plain, further, _by_recording(felt, run_of[use])]))
+        wider = _basis(np.column_stack([plain, further, by_recording(felt[:, LOAD], run_of[use])]))
         if _needed(basis, wider, y):
             # a load of a recording would follow part of its own lag
             shared, basis = _basis(np.column_stack([plain, further])), wider
@@ -319,26 +318,38 @@ class JointFit:
         self.fits, self.changed = fits, list(changed)
         self.signals = s = fits.motion(Reading())
         self.base = base_parameter_index(fits.robot)
-        regressor = fits.mean_regressor(fits.robot, s, self.base)
+        last = 10 * fits.robot.n_bodies + LOAD if fits.loads else LOAD[:0]
+        regressor = fits.mean_regressor(fits.robot, s, np.append(self.base, last))
+        self.number = s.trajectory[::SAMPLES] if fits.loads else s.trajectory[::SAMPLES] * 0
         self.joints: list[int] = []
         self.designs: list[Array] = []
         self.places: list[NDArray[np.int64]] = []
         self.rows: list[NDArray[np.bool_]] = []
         self.own: list[Array] = []
-        first = len(self.base)
+        first = len(self.base) + n_loads(self.number)
         for j in range(fits.n_joints):
             use = _sliding(fits, s, j)
             if not fits.usable(j) or use.sum() < FEWEST:
                 continue
             own = _own_columns(s, j)
-            felt = np.flatnonzero(regressor[:, j].any(axis=0))
+            felt = np.flatnonzero(regressor[:, j, : len(self.base)].any(axis=0))
+            load = by_recording(regressor[:, j, len(self.base) :], self.number)[use]
             self.joints.append(j)
             self.rows.append(use)
             self.own.append(own)
-            self.designs.append(np.hstack([regressor[use, j][:, felt], fits.average(own)[use]]))
-            self.places.append(np.append(felt, first + np.arange(own.shape[1])))
+            self.designs.append(
+                np.hstack([regressor[use, j][:, felt], load, fits.average(own)[use]])
+            )
+            loads = len(self.base) + np.arange(load.shape[1])
+            self.places.append(np.concatenate([felt, loads, first + np.arange(own.shape[1])]))
             first += own.shape[1]
         self.torque = fits.average(fits.torque)
+
+    def changing(self, changed: Sequence[int]) -> JointFit:
+        """The same fit, in which the torque of other joints is changed."""
+        other = copy(self)
+        other.changed = list(changed)
+        return other
 
     def moved(self, signals: Signals) -> JointFit:
         """The same coefficients for another motion, whose residual :meth:`left` gives."""
@@ -362,10 +373,22 @@ class JointFit:
         """Residual torque of every sample, for the fitted joints."""
         robot, s = self.fits.robot, self.signals
         parameters = np.zeros((robot.n_bodies, 10))
+        loads = np.zeros(n_loads(self.number))
         for place, fit in zip(self.places, fitted, strict=True):
             bodies = place < len(self.base)
             parameters.flat[self.base[place[bodies]]] = fit.coefficients[bodies]
+            carried = (place >= len(self.base)) & (place < len(self.base) + len(loads))
+            loads[place[carried] - len(self.base)] = fit.coefficients[carried]
         rigid = robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=parameters)
+        for run, load in zip(
+            np.unique(self.number)[1:], loads.reshape(-1, len(LOAD)), strict=False
+        ):
+            rows = np.repeat(self.number == run, SAMPLES)
+            carried_only = np.zeros((robot.n_bodies, 10))
+            carried_only.flat[10 * robot.n_bodies + LOAD] = load
+            rigid[rows] += robot.inverse_dynamics(
+                s.q[rows], s.dq[rows], s.ddq[rows], parameters=carried_only
+            )
         own = [
             columns @ fit.coefficients[-columns.shape[1] :]
             for columns, fit in zip(self.own, fitted, strict=True)
@@ -402,6 +425,25 @@ def refined_lag(fits: Fits, start: float, error: float, late: Sequence[int]) -> 
 
     lag = peak(likelihood, start, NEAR)
     return lag if abs(lag - start) < max(2 * error, FAR) else start
+
+
+def lag_gain(fits: Fits, lag: float, late: Sequence[int]) -> float:
+    """Log-likelihood that a lag of some torques gains, with bodies common to all joints.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    lag : float, s
+    late : sequence of int
+        Joints, from 0.
+    """
+    together = JointFit(fits, late)
+    here, there = together.fit(fits.torque), together.fit(fits.torque_at(lag))
+    return sum(
+        (after.likelihood - before.likelihood) / max(after.inflation, 1.0)
+        for before, after in zip(here, there, strict=True)
+    )
 
 
 def _first_half(fits: Fits) -> NDArray[np.bool_]:
@@ -452,15 +494,6 @@ def _needed(known: Array, wider: Array, torque: Array) -> bool:
         for basis in (known, wider)
     )
     return bool(n * np.log(left / max(least, 1e-300)) > CORRELATED * further * np.log(n))
-
-
-def _by_recording(regressor: Array, run_of: Array) -> Array:
-    """Columns of a load on the last body that differs from recording to recording."""
-    load = regressor[:, -10:-6]  # its mass and first moments
-    runs = np.unique(run_of)
-    if not FEW_RUNS < len(runs) <= MOST_RUNS:
-        return np.zeros((len(load), 0))
-    return np.hstack([load * (run_of == run)[:, None] for run in runs[1:]])
 
 
 def _bent_friction(signals: Signals, joint: int) -> Array:

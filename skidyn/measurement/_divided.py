@@ -13,19 +13,20 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 from math import comb
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.measurement._bodies import explained
+from skidyn.measurement._bodies import CLEARLY, explained, joint_gain
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
 from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading, lines_between
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._robust import fit_at_once, fit_together
 from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._torque import asked_changes
+from skidyn.measurement._torque import asked_gain
 
 #: Fewest recordings, and rows of each, to be compared.
 RECORDINGS, FEWEST = 4, 12
@@ -41,11 +42,17 @@ ROUNDS, RIDGE = 12, 1e-6
 #: Log-likelihood that two groups must gain with identified bodies, the share of the residual that
 #: they must take off, and what they may leave of what the best effect leaves.
 SURE, DROP, BETTER = 40.0, 0.4, 0.8
+#: How many times as much two groups must gain as another reading of all recordings.
+MORE = 1.25
 #: Zeros that are tried, and the least that is reported, rad.
 ZEROS, LEAST_ZERO = np.deg2rad([-60, -40, -20, 20, 40, 60]), np.deg2rad(4)
 #: Zeros that are examined in detail, rows for the choice of them, and most groups of recordings
 #: that are all tried.
 FINALISTS, ROWS, MOST_GROUPS = 4, 400, 100
+
+
+#: Rough gain, joint, angle and recordings of a zero.
+Tried: TypeAlias = tuple[float, int, float, NDArray[np.int64]]
 
 
 @dataclass(frozen=True)
@@ -89,11 +96,17 @@ class DividedRecordings(Check):
         if seen is None or seen.errors[1].max() < WORTH:
             return
         fits = seen.fits
-        found = [*_divided_torques(fits, seen.joints), *_divided_zeros(fits)]
+        zeros = list(divided_zeros(fits))
+        found = [*_divided_torques(fits, seen.joints), *zeros]
         if not found:
             return
         best = max(found, key=lambda one: one.gain)
-        if sum(c.gain for c in asked_changes(measurement, fits) if not c.other) > best.gain:
+        if best.kind == "zero" and _is_scale(fits.loaded(), best):
+            return
+        if len(best.runs) == 1:
+            measurement.one_zero = best  # for the check of single recordings
+            return
+        if MORE * asked_gain(measurement, fits) > best.gain:
             return
         measurement.odd = True
         name = measurement.joint(best.joint)
@@ -111,6 +124,13 @@ class DividedRecordings(Check):
             "suspected",
             [best.joint],
         )
+
+
+def _is_scale(fits: Fits, zero: Division) -> bool:
+    """Whether another scale of a torque in all recordings explains more than a zero in some."""
+    gains = fits.nominal(Reading()).gain
+    odd = [k for k, gain in enumerate(gains) if gain > 0 and not CLEARLY[0] < gain < CLEARLY[1]]
+    return any(joint_gain(fits, k, float(gains[k]))[1] > zero.gain for k in odd)
 
 
 def _runs_of(fits: Fits) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -251,20 +271,39 @@ def _two_groups(multiples: Array) -> tuple[NDArray[np.bool_], float] | None:
     return others, -1.0 if USUAL[0] < -value < USUAL[1] else value
 
 
-def _divided_zeros(fits: Fits) -> Iterator[Division]:
-    """A joint whose position has one of two zeros."""
+def divided_zeros(fits: Fits) -> Iterator[Division]:
+    """A joint whose position has one of two zeros, or another one in a single recording.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    """
     number, runs = _runs_of(fits)
     turning = np.flatnonzero(~fits.signals.prismatic).tolist()
     if len(runs) < RECORDINGS or not turning:
         return
     here = fits.identified(Reading())
     few = fits.thinned(ROWS)
-    tried = []
+    tried: list[Tried] = []
     for k in turning:
         for angle in ZEROS.tolist():
             gain, group = _best_group(len(runs), partial(_likelihoods, few, here, k, angle))
             tried.append((gain, k, angle, runs[group]))
     tried.sort(key=lambda one: -one[0])
+    # a zero of the last joint is a load of these recordings, which has more coefficients
+    loaded = fits.loaded()
+    for rows in (loaded, fits)[loaded is fits :]:
+        found = _refined_zero(rows, tried[:FINALISTS])
+        if found is not None:
+            yield found
+            return
+
+
+def _refined_zero(fits: Fits, tried: list[Tried]) -> Division | None:
+    """The best of some zeros, as identified bodies need it; None if they do not."""
+    number, runs = _runs_of(fits)
+    here = fits.identified(Reading())
 
     def mended(k: int, angle: float, out: NDArray[np.int64]) -> Fits:
         q = fits.signals.q.copy()
@@ -275,10 +314,10 @@ def _divided_zeros(fits: Fits) -> Iterator[Division]:
         return float(mended(k, angle, out).identified(Reading()).margin(here).sum())
 
     value, k, angle, out = max(
-        ((margin(*one[1:]), *one[1:]) for one in tried[:FINALISTS]), key=lambda one: one[0]
+        ((margin(*one[1:]), *one[1:]) for one in tried), key=lambda one: one[0]
     )
     if value < SURE:
-        return
+        return None
     step = np.deg2rad(10)
     while step > np.deg2rad(1):
         near, other = max((margin(k, a, out), a) for a in (angle - step, angle + step))
@@ -287,7 +326,7 @@ def _divided_zeros(fits: Fits) -> Iterator[Division]:
         else:
             step /= 2
     if abs(angle) < LEAST_ZERO:
-        return
+        return None
     if 2 * len(out) > len(runs):
         out, angle = np.setdiff1d(runs, out), -angle
     fixed = mended(k, angle, out)
@@ -295,7 +334,8 @@ def _divided_zeros(fits: Fits) -> Iterator[Division]:
     worst = int(np.argmax(there.margin(here)))
     drop = 1 - float(_spread(there.residual[worst]) / _spread(here.residual[worst]))
     if drop > DROP and _unlike_effects(fits, fixed, worst, np.isin(number, out)):
-        yield Division("zero", k, tuple(map(int, out)), angle, value, drop)
+        return Division("zero", k, tuple(map(int, out)), angle, value, drop)
+    return None
 
 
 def _unlike_effects(
@@ -310,11 +350,11 @@ def _unlike_effects(
 
 
 def _best_group(n: int, likelihoods: Callable[[list[list[int]]], Array]) -> tuple[float, list[int]]:
-    """The likeliest group of a third to half of n recordings, by their numbers from 0.
+    """The likeliest group of up to half of n recordings, by their numbers from 0.
 
     Of many recordings not all groups are tried, but from a group those with one more or one fewer.
     """
-    sizes = range(int(np.ceil(SHARE * n)), n // 2 + 1)
+    sizes = range(1, n // 2 + 1)
     if sum(comb(n, size) for size in sizes) <= MOST_GROUPS:
         groups = [list(group) for size in sizes for group in combinations(range(n), size)]
         values = likelihoods(groups)
@@ -322,11 +362,10 @@ def _best_group(n: int, likelihoods: Callable[[list[list[int]]], Array]) -> tupl
     group: list[int] = []
     value = -np.inf
     while True:
-        least = min(sizes.start, len(group) + 1)
         groups = [sorted({k} ^ set(group)) for k in range(n)]
-        groups = [g for g in groups if least <= len(g) < sizes.stop]
+        groups = [g for g in groups if len(g) in sizes]
         values = likelihoods(groups)
-        if len(group) >= sizes.start and values.max() <= value:
+        if group and values.max() <= value:
             return value, group
         value, group = float(values.max()), groups[int(np.argmax(values))]
 
@@ -365,8 +404,7 @@ def _likelihoods(
 
 def _with_positions(fits: Fits, q: Array) -> Fits:
     """The same rows with other positions, (n_samples, n_joints)."""
-    moved = fits.signals.with_(q=q)
-    return Fits(fits.robot, moved, fits.torque, fits.moving, fits.recorded, fits.left_out)
+    return fits.with_motion(fits.signals.with_(q=q))
 
 
 def _spread(values: Array) -> float:

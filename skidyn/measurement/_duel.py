@@ -17,14 +17,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array
 from skidyn.effects import Effect, get_effect, searched_kinds
 from skidyn.measurement._fits import Fits, Reading
-from skidyn.measurement._near_bodies import LOOSE, POWERS, ExtraColumns, Factored, NearBodies
-from skidyn.robots import Robot
+from skidyn.measurement._near_bodies import (
+    LOOSE,
+    ExtraColumns,
+    Factored,
+    NearBodies,
+    likely_load,
+)
 
-#: Mass of a payload, as a share of the robot's, and its distance in m (one standard deviation).
-CARRIED, AWAY = 0.1, 0.2
 #: Number of effects that are examined in detail.
 FINALISTS = 4
 #: Penalty of each parameter of an effect in log-likelihood: half the logarithm of some 150 rows.
@@ -134,12 +136,6 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[fl
     left = [float(np.sqrt(np.mean(fit.residuals[k][own] ** 2))) for fit in fits_of]
     scaled = [x / fit.scales[k] for x, fit in zip(left, fits_of, strict=True)]
     return scaled[0], min(scaled), min(left)
-
-
-def likely_load(robot: Robot) -> Array:
-    """Standard deviations of the ten parameters of a payload, of which nothing else is known."""
-    masses = np.asarray(robot.inertial_parameters, dtype=float).reshape(-1, 10)[:, 0]
-    return np.asarray(CARRIED * float(masses.sum()) * AWAY**POWERS)
 
 
 def _effects() -> Iterator[Effect]:

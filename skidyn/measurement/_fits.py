@@ -11,7 +11,7 @@ wrong masses of the description.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
-from skidyn.evidence import REST, smooth_motion
+from skidyn.measurement._loads import LOAD, by_recording, n_loads, span
 from skidyn.measurement._robust import (
     FEWEST,
     ROUNDS,
@@ -32,10 +32,13 @@ from skidyn.robots import Robot, base_parameter_index, with_whole_turns
 
 #: Nodes of a function of the position.
 PLACES = 8
-#: Width of a row in s and the samples in it; most rows used, over all intervals of the log.
-WIDTH, SAMPLES, MOST_ROWS = 0.125, 6, 1200
+#: Samples in a row.
+SAMPLES = 6
 #: Columns of a joint in addition to those of the bodies: friction, rotor inertia and a constant.
 OWN = 4
+#: Log-likelihood that every coefficient of a load must gain on average: half the logarithm of some
+#: 150 rows, twice.
+LOADED = 5.0
 #: Number of motions whose columns are cached.
 KEPT = 2
 #: Parts of a reading that do not concern the motion.
@@ -153,6 +156,8 @@ class Fits:
     backend : {"numpy", "once"}, default="numpy"
         Method to compute torques; for a robot that is only tried, generating a program is not worth
         its time.
+    loads : bool, default=False
+        Whether identified bodies include a load that differs from recording to recording.
     """
 
     robot: Robot
@@ -162,15 +167,18 @@ class Fits:
     recorded: Recorded
     left_out: frozenset[int] = frozenset()
     backend: str = "numpy"
+    loads: bool = False
     _fewer: dict[frozenset[int], Fits] = field(default_factory=dict, repr=False)
     _known: dict[Reading, Outcome] = field(default_factory=dict, repr=False)
     _moved: dict[Reading, Array] = field(default_factory=dict, repr=False)
     _rubbed: dict[Reading, list[Array]] = field(default_factory=dict, repr=False)
+    _carried: dict[Reading, Array] = field(default_factory=dict, repr=False)
     _parts: dict[Reading, tuple[Array, Array]] = field(default_factory=dict, repr=False)
     _fitted: dict[tuple[Any, ...], RobustFit] = field(default_factory=dict, repr=False)
     _felt: dict[Reading, list[tuple[Array, NDArray[np.int64]]]] = field(
         default_factory=dict, repr=False
     )
+    _loaded: dict[Reading, Fits] = field(default_factory=dict, repr=False)
 
     @property
     def n_joints(self) -> int:
@@ -183,16 +191,12 @@ class Fits:
         if left_out == self.left_out:
             return self  # with all that was fitted so far
         if left_out not in self._fewer:
-            self._fewer[left_out] = Fits(
-                self.robot, self.signals, self.torque, self.moving, self.recorded, left_out
-            )
+            self._fewer[left_out] = self._anew(left_out=left_out)
         return self._fewer[left_out]
 
     def of(self, robot: Robot) -> Fits:
         """The same rows, for another robot with the same joints, which is only tried."""
-        return Fits(
-            robot, self.signals, self.torque, self.moving, self.recorded, self.left_out, "once"
-        )
+        return self._anew(robot=robot, backend="once")
 
     def thinned(self, count: int) -> Fits:
         """Some of the rows, evenly over the log, for a first test."""
@@ -202,16 +206,45 @@ class Fits:
         rows = np.arange(0, self.n_rows, step)
         samples = (rows[:, None] * SAMPLES + np.arange(SAMPLES)).ravel()
         recorded = replace(self.recorded, picked=self.recorded.picked[samples])
-        signals, torque = self.signals.take(samples), self.torque[samples]
-        return Fits(self.robot, signals, torque, self.moving[rows], recorded, self.left_out)
+        return self._anew(
+            signals=self.signals.take(samples),
+            torque=self.torque[samples],
+            moving=self.moving[rows],
+            recorded=recorded,
+        )
+
+    def _anew(self, **changes: Any) -> Fits:
+        """Changed rows, of which nothing has been fitted."""
+        kept = {f.name: getattr(self, f.name) for f in fields(self) if not f.name.startswith("_")}
+        return Fits(**{**kept, **changes})
+
+    def loaded(self, reading: Reading | None = None) -> Fits:
+        """The same rows, with loads where these explain far more than chance in a reading.
+
+        A load of a recording, as of a workpiece, is larger than most mistakes; identified bodies
+        that are common to all recordings would leave it as a residual in which they are lost.
+        """
+        count = n_loads(self.signals.trajectory)
+        if self.loads or not count:
+            return self
+        reading = reading or Reading()
+        if reading not in self._loaded:
+            other = self.with_loads()
+            gain = float(other.identified(reading).margin(self.identified(reading)).sum())
+            self._loaded[reading] = other if gain > LOADED * count else self
+        return self._loaded[reading]
+
+    def with_loads(self, loads: bool = True) -> Fits:
+        """The same rows, with loads in any case, or without."""
+        return self if self.loads == loads else self._anew(loads=loads)
 
     def with_torque(self, torque: Array) -> Fits:
         """The same rows with another torque, (n_samples, n_joints); what motion implies is kept."""
-        return replace(self, torque=torque, _fewer={}, _known={}, _fitted={})
+        return replace(self, torque=torque, _fewer={}, _known={}, _fitted={}, _loaded={})
 
     def with_motion(self, signals: Signals) -> Fits:
         """The same rows and torque with another motion."""
-        return Fits(self.robot, signals, self.torque, self.moving, self.recorded, self.left_out)
+        return self._anew(signals=signals)
 
     def scaled(self, gains: Mapping[int, float]) -> Fits:
         """The same rows with columns of the torque divided by gains."""
@@ -316,6 +349,8 @@ class Fits:
             joints, columns, signs = (np.array(x) for x in zip(*new, strict=True))
             own = self.columns(motion)[:, :, joints].transpose(2, 0, 1)
             y, use = (signs * self._mean_torque[:, columns]).T, self.moving[:, columns].T
+            if self.loads:
+                own, y = self._beside_loads(motion, joints, own, y, use)
             found = (
                 fit_at_once(own, y, use)
                 if rounds == 1
@@ -326,6 +361,33 @@ class Fits:
             for key, fit in zip(new, found, strict=True):
                 self._fitted[motion, *key, rounds] = fit
         return [self._fitted[motion, *key, rounds] for key in read]
+
+    def _beside_loads(
+        self,
+        motion: Reading,
+        joints: NDArray[np.int64],
+        own: Array,
+        y: Array,
+        use: NDArray[np.bool_],
+    ) -> tuple[Array, Array]:
+        """Columns and torques of joints without what a load of single recordings follows of them.
+
+        Stated bodies have no common fit of all joints, so each of these has a load of its own.
+        """
+        if motion not in self._carried:
+            while len(self._carried) >= KEPT:
+                del self._carried[next(iter(self._carried))]
+            robot, s = self._robot(motion), self.motion(motion)
+            felt = self.mean_regressor(robot, s, 10 * robot.n_bodies + LOAD)
+            self._carried[motion] = felt
+        felt, number = self._carried[motion], self.signals.trajectory[::SAMPLES]
+        own, y = own.copy(), y.copy()
+        for i, j in enumerate(joints.tolist()):
+            load = by_recording(felt[:, j], number)[use[i]]
+            basis = span(np.column_stack([load, np.ones(len(load))]))
+            for values in (own[i], y[i]):
+                values[use[i]] -= basis @ (basis.T @ values[use[i]])
+        return own, y
 
     def offset(self, reading: Reading) -> float:
         """Largest median difference from the stated bodies, in units of the scale of the residual.
@@ -441,9 +503,12 @@ class Fits:
     def only(self, rows: NDArray[np.bool_]) -> Fits:
         """Some of the rows."""
         samples = np.repeat(rows, SAMPLES)
-        recorded = replace(self.recorded, picked=self.recorded.picked[samples])
-        signals, torque = self.signals.take(samples), self.torque[samples]
-        return Fits(self.robot, signals, torque, self.moving[rows], recorded, self.left_out)
+        return self._anew(
+            signals=self.signals.take(samples),
+            torque=self.torque[samples],
+            moving=self.moving[rows],
+            recorded=replace(self.recorded, picked=self.recorded.picked[samples]),
+        )
 
     def bodies(self) -> tuple[Array, dict[int, float]]:
         """Identified coefficients of the unchanged log, and scale of the residual by joint."""
@@ -510,12 +575,19 @@ class Fits:
             self._felt.clear()
             robot, s = self._robot(motion), self.motion(motion)
             base = base_parameter_index(robot)
-            regressor = self.mean_regressor(robot, s, base)
-            found = []
+            last = 10 * robot.n_bodies + LOAD if self.loads else LOAD[:0]
+            regressor = self.mean_regressor(robot, s, np.append(base, last))
+            number, found = s.trajectory[::SAMPLES], []
+            first = len(base) + OWN * self.n_joints
             for j in range(self.n_joints):
-                felt = np.flatnonzero(regressor[:, j].any(axis=0))  # bodies that the joint moves
+                felt = np.flatnonzero(regressor[:, j, : len(base)].any(axis=0))  # moved bodies
                 columns = np.hstack([regressor[:, j][:, felt], self._own_columns(s, j)])
-                found.append((columns, np.append(felt, len(base) + OWN * j + np.arange(OWN))))
+                place = np.append(felt, len(base) + OWN * j + np.arange(OWN))
+                carried = by_recording(regressor[:, j, len(base) :], number)
+                if carried.size and regressor[:, j, len(base) :].any():
+                    columns = np.hstack([columns, carried])
+                    place = np.append(place, first + np.arange(carried.shape[1]))
+                found.append((columns, place))
             self._felt[motion] = found
         return self._felt[motion]
 
@@ -564,60 +636,3 @@ def lines_between(position: Array) -> Array:
     """
     nodes = np.unique(np.quantile(position, np.linspace(0, 1, PLACES)))
     return np.stack([np.interp(position, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
-
-
-def smoothed(signals: Signals) -> Signals:
-    """Smoothed motion of a recording, computed once for all checks."""
-    motion: Signals = signals.once("smooth motion", lambda: smooth_motion(signals))
-    return motion
-
-
-def make_fits(signals: Signals, torque: Array, robot: Robot) -> Fits | None:
-    """Rows of a measurement; None if no interval of it is long enough.
-
-    Parameters
-    ----------
-    signals : Signals
-        Recorded motion.
-    torque : ndarray of shape (n_samples, n_joints), N m or N
-        Recorded torque.
-    robot : Robot
-        As described.
-    """
-    motion = smoothed(signals)
-    every = max(1, round(motion.rate * WIDTH / SAMPLES))
-    mean = running_mean(torque, every | 1)  # an even number would be half a sample late
-    parts = []
-    for rows in signals.segments:
-        edge = max(2, motion.half_width // 2) + every
-        picked = np.arange(rows.start + edge, rows.stop - edge, every)
-        parts.append(picked[: len(picked) // SAMPLES * SAMPLES].reshape(-1, SAMPLES))
-    blocks = np.concatenate(parts) if parts else np.zeros((0, SAMPLES), dtype=int)
-    if len(blocks) < FEWEST:
-        return None
-    if len(blocks) > MOST_ROWS:  # intervals of rows from all parts of the log
-        blocks = blocks[_stretches(len(blocks))]
-    rows_used = blocks.ravel()
-    taken = motion.take(rows_used).with_(robot=None)
-    slow = REST * taken.unit
-    moving = np.abs(taken.dq).reshape(-1, SAMPLES, robot.n_joints).mean(axis=1) > slow
-    recorded = Recorded(signals.clock, mean, signals.segments, rows_used)
-    return Fits(robot, taken, mean[rows_used], moving, recorded)
-
-
-def _stretches(n: int) -> NDArray[np.int64]:
-    """Rows of 24 stretches evenly over a log."""
-    length = MOST_ROWS // 24
-    starts = np.linspace(0, n - length, 24).astype(int)
-    return np.unique(starts[:, None] + np.arange(length))
-
-
-def running_mean(values: Array, width: int) -> Array:
-    """Mean around every sample; ends are not used."""
-    if width < 2:
-        return values
-    total = np.cumsum(np.vstack([np.zeros(values.shape[1]), values]), axis=0)
-    n = len(values)
-    low = np.clip(np.arange(n) - width // 2, 0, n)
-    high = np.clip(low + width, 0, n)
-    return np.asarray((total[high] - total[low]) / np.maximum(high - low, 1)[:, None])

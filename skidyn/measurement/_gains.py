@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._delay import FEW_RUNS, MOST_RUNS
-from skidyn.measurement._duel import likely_load
 from skidyn.measurement._fits import SAMPLES, Fits, Reading
-from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies
+from skidyn.measurement._loads import FEW_RUNS, MOST_RUNS
+from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies, likely_load
 
 #: Most steps, the largest one, and the one that ends them.
 STEPS, FARTHEST, CLOSE = 8, 0.3, 1e-3
@@ -81,6 +80,7 @@ def refined_scales(fits: Fits, gains: Mapping[int, float], free: Mapping[int, fl
         Scales that are refined, as far as they are known; the torques of other joints are at those
         of ``gains``.
     """
+    fits = fits.with_loads(False)  # which are columns of their own here
     inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
     now = np.ones(fits.n_joints)
     for k, gain in {**gains, **free}.items():

@@ -17,7 +17,6 @@ from skidyn.measurement._duel import duel_of
 from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._near_bodies import LOOSE, ExtraColumns, Factored, NearBodies
-from skidyn.measurement._robust import fit_admissible
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes, readable_fits
 
@@ -39,13 +38,9 @@ class JointGravity(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         fits = readable_fits(measurement)
-        if fits is None or measurement.odd or measurement.scaled or measurement.computed:
+        if fits is None or measurement.scaled:
             return
-        if not np.any(fits.robot.inertial_parameters) or not np.any(fits.robot.gravity):
-            return
-        if any(not change.other for change in asked_changes(measurement, fits)):
-            return
-        for k, share, error, gain in find_without_gravity(fits):
+        for k, (share, error, gain) in without_gravity(measurement, fits).items():
             yield self.suspicion(
                 f"the torque of {measurement.joint(k)} contains no gravity, but that of other "
                 "joints does",
@@ -58,6 +53,30 @@ class JointGravity(Check):
             )
 
 
+def without_gravity(measurement: Measurement, fits: Fits) -> dict[int, tuple[float, float, float]]:
+    """Joints, from 0, whose torque has no gravity, in a measurement that is read correctly.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Recording and robot.
+    fits : Fits
+        Its rows.
+
+    Returns
+    -------
+    dict of int to (float, float, float)
+        Missing share, its standard error, and gain.
+    """
+    if measurement.odd or measurement.computed:
+        return {}
+    if not np.any(fits.robot.inertial_parameters) or not np.any(fits.robot.gravity):
+        return {}
+    if any(not change.other for change in asked_changes(measurement, fits)):
+        return {}
+    return {k: (x, error, gain) for k, x, error, gain in find_without_gravity(fits)}
+
+
 def find_without_gravity(fits: Fits) -> list[tuple[int, float, float, float]]:
     """Joints whose torque has no gravity: joint, from 0, missing share, its error, and gain.
 
@@ -68,7 +87,10 @@ def find_without_gravity(fits: Fits) -> list[tuple[int, float, float, float]]:
     """
     gravity = fits.robot.gravity_torque(fits.motion(Reading()).q)
     pull = fits.average(gravity)
-    columns = fits.columns(Reading())
+    fits = fits.loaded()
+    torque = fits.torque + gravity
+    before, after = (rows.nominal(Reading()) for rows in (fits, fits.with_torque(torque)))
+    gained = after.likelihood - before.likelihood
     promising = []
     for k in range(fits.n_joints):
         if not fits.usable(k):
@@ -76,10 +98,7 @@ def find_without_gravity(fits: Fits) -> list[tuple[int, float, float, float]]:
         y, use = fits.mean_torque(k)
         if np.std(pull[use, k]) < 0.2 * np.std(y[use] + pull[use, k]):
             continue
-        before, after = (
-            fit_admissible(columns[use, :, k], target[use]) for target in (y, y + pull[:, k])
-        )
-        if after.likelihood - before.likelihood > LEAST:
+        if gained[k] > 0:  # bodies near the stated ones decide
             promising.append(k)
     if not promising:
         return []

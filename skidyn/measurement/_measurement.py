@@ -27,6 +27,7 @@ from skidyn.measurement._measures import (
 
 if TYPE_CHECKING:
     from skidyn.measurement._delay import Delay
+    from skidyn.measurement._divided import Division
     from skidyn.measurement._fits import Fits
     from skidyn.measurement._readings import Change
     from skidyn.measurement._servo_limits import Servo
@@ -67,7 +68,7 @@ class Measurement:
         have an even clock.
     unsigned, changes, delay, copies, servos, late_position, readable, stale, lost, odd : optional
         Results of checks that are used by other checks; set by them.
-    scaled, smoothed, computed, frictionless, mixed : bool, optional
+    one_zero, dead, scaled, smoothed, computed, frictionless, mixed : optional
         Results of checks that are used by other checks; set by them.
     clock : float, optional
         Number of units of the clock in a second; set by its check.
@@ -101,6 +102,8 @@ class Measurement:
     stale: bool = field(default=False, repr=False)
     lost: bool = field(default=False, repr=False)
     odd: bool = field(default=False, repr=False)
+    one_zero: Division | None = field(default=None, repr=False)
+    dead: bool = field(default=False, repr=False)
     scaled: bool = field(default=False, repr=False)
     smoothed: bool = field(default=False, repr=False)
     computed: bool = field(default=False, repr=False)
@@ -269,7 +272,7 @@ class Measurement:
     @cached_property
     def fits(self) -> Fits | None:
         """Averaged rows to which readings of the measurement are fitted."""
-        from skidyn.measurement._fits import make_fits  # with it all columns of the evidence
+        from skidyn.measurement._rows import make_fits  # with it all columns of the evidence
 
         if self.robot is None:
             return None

@@ -15,6 +15,9 @@ STRIDE = 10
 CATCHES = 3.0
 #: Windows over which velocity is compared with differentiated position, s.
 WINDOW = 0.05
+#: Correlation from which velocity is proportional to the rate of the position, the share of the
+#: windows that may be left out for it, and in how many rounds these are found.
+PROPORTIONAL, FEW, TRIMS = 0.98, 0.02, 3
 #: Least share of rows that hold all torques to be reported, and of those that hold any.
 HELD, AT_ONCE = 0.2, 0.7
 #: Least size of a jump of a position: as a multiple of its steps before and after, as a multiple of
@@ -292,12 +295,25 @@ def velocity_consistency(
     """Slope and correlation of integrated velocity against change of position.
 
     Both are taken over windows of 50 ms (in samples of the median step), which averages noise and
-    quantisation out. NaN where the joint does not move.
+    quantisation out. NaN where the joint does not move. A few windows are left out if all others
+    are proportional: a lost sample that is near the others is no outlier of the position.
     """
     x, y, _ = way_and_area(time, position, velocity, segments)
     if x @ x < 1e-20 or y @ y < 1e-20:
         return np.nan, np.nan
-    return float(x @ y / (x @ x)), float(x @ y / np.sqrt((x @ x) * (y @ y)))
+    slope, likeness = _proportion(x, y)
+    trimmed = slope, likeness
+    for _ in range(TRIMS if likeness < PROPORTIONAL else 0):
+        left = np.abs(y - trimmed[0] * x)
+        kept = left <= np.quantile(left, 1 - FEW)
+        trimmed = _proportion(x[kept], y[kept])
+    return trimmed if trimmed[1] > PROPORTIONAL else (slope, likeness)
+
+
+def _proportion(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Slope of y on x through zero, and their correlation."""
+    xx, yy = float(x @ x) + 1e-300, float(y @ y) + 1e-300
+    return float(x @ y) / xx, float(x @ y) / np.sqrt(xx * yy)
 
 
 def way_and_area(
@@ -441,3 +457,15 @@ def divided_differences(values: np.ndarray, time: np.ndarray, order: int) -> np.
     weights /= np.sqrt(np.sum(weights**2, axis=0))
     shape = (n, *(1,) * (values.ndim - 1))
     return np.asarray(sum(w.reshape(shape) * values[k : n + k] for k, w in enumerate(weights)))
+
+
+def is_short(values: np.ndarray) -> bool:
+    """Whether all values are numbers of half precision, eleven binary digits.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_samples,)
+    """
+    if np.abs(values).max() > 6e4 or np.any(values != values.astype(np.float16)):
+        return False
+    return len(np.unique(values)) >= 50

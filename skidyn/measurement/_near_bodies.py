@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import Fits, Reading, friction
+from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction
+from skidyn.measurement._loads import LOAD, by_recording, n_loads
 from skidyn.measurement._robust import FREEDOM, student
 from skidyn.robots import Robot
 
 #: Shares of a body's mass, times its length and its square for first and second moments, to which a
 #: description may be known (one standard deviation); the one that explains most is taken.
 KNOWN_TO = (0.03, 0.1, 0.3)
+#: Mass of a payload, as a share of the robot's, and its distance in m (one standard deviation).
+CARRIED, AWAY = 0.1, 0.2
 #: Rounds of the robust fit.
 ROUNDS = 7
 #: Powers of a length in the ten parameters of a body.
@@ -89,22 +92,31 @@ class NearBodies:
         read = [fits.torque_column(reading, j) for j in range(fits.n_joints)]
         self.joints = [j for j, (column, _) in enumerate(read) if fits.usable(column)]
         self.inflation = [float(inflation[read[j][0]]) for j in self.joints]
-        self.n_bodies, self.size = stated.size, stated.size + 4 * len(self.joints)
+        number = self.signals.trajectory[::SAMPLES] if fits.loads else np.zeros(fits.n_rows, int)
+        self.n_loads = n_loads(number)
+        self.n_bodies, self.size = stated.size, stated.size + 4 * len(self.joints) + self.n_loads
         self.rows: list[NDArray[np.bool_]] = []
         self.designs: list[Array] = []
         self.places: list[NDArray[np.int64]] = []
         self.targets: list[Array] = []
         self.positive: list[int] = []
-        for first, j in zip(range(stated.size, self.size, 4), self.joints, strict=True):
+        for first, j in zip(
+            stated.size + 4 * np.arange(len(self.joints)), self.joints, strict=True
+        ):
             column, sign = read[j]
             torque, use = fits.mean_torque(column)
             y, own = torque[use], gains[column] * regressor[use, j]
             rubs = fits.average(friction(self.signals, j))[use]
             rubs = np.column_stack([rubs / (np.abs(rubs).max(axis=0) + 1e-12), np.ones(len(y))])
             moved = np.flatnonzero(own.any(axis=0))  # not by bodies before the joint
+            load = gains[column] * regressor[:, j, LOAD] * likely_load(robot)[: len(LOAD)]
+            carried = by_recording(load, number)[use]
             self.rows.append(use)
-            self.designs.append(np.hstack([(own * size)[:, moved], (np.std(y) + 1e-12) * rubs]))
-            self.places.append(np.append(moved, first + np.arange(4)))
+            self.designs.append(
+                np.hstack([(own * size)[:, moved], (np.std(y) + 1e-12) * rubs, carried])
+            )
+            loads = self.size - self.n_loads + np.arange(carried.shape[1])
+            self.places.append(np.concatenate([moved, first + np.arange(4), loads]))
             self.positive += range(first, first + 3)  # negative friction would generate energy
             self.targets.append(sign * y - own @ stated)
 
@@ -130,6 +142,7 @@ class NearBodies:
                     places[k] = np.append(places[k], new)
         precision = np.full(size, LOOSE)
         precision[: self.n_bodies] = share**-2
+        precision[self.size - self.n_loads : self.size] = 1.0
         if extra is not None:
             precision[-extra.count :] = extra.precision
         scales = [float(np.std(y)) + 1e-12 for y in self.targets]
@@ -161,6 +174,7 @@ class NearBodies:
         ]
         bodies = slice(self.n_bodies)
         departure = 0.5 * float(np.sum((found[bodies] / share) ** 2))
+        departure += 0.5 * float(np.sum(found[self.size - self.n_loads : self.size] ** 2))
         if extra is not None:
             departure += 0.5 * float(np.sum(extra.precision * found[-extra.count :] ** 2))
         # bodies are integrated out, which penalises an uncertain description
@@ -194,6 +208,12 @@ class NearBodies:
         left = own - cross.T @ factor.solve(cross)
         left[np.diag_indices(m)] += 1e-6 * np.trace(own) / m + 1e-300
         return left, right
+
+
+def likely_load(robot: Robot) -> Array:
+    """Standard deviations of the ten parameters of a payload, of which nothing else is known."""
+    masses = np.asarray(robot.inertial_parameters, dtype=float).reshape(-1, 10)[:, 0]
+    return np.asarray(CARRIED * float(masses.sum()) * AWAY**POWERS)
 
 
 def sizes(robot: Robot) -> Array:

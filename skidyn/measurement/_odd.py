@@ -19,7 +19,7 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd_order import find_exchanges
 from skidyn.measurement._robust import robust_likelihood, student
 from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._torque import asked_changes
+from skidyn.measurement._torque import asked_gain
 
 #: Fewest rows of a recording to be judged.
 FEWEST = 12
@@ -132,9 +132,14 @@ class OddRecording(Check):
             if zero is not None:
                 shifted[worst.run] = zero
                 unlike = [one for one in unlike if one.run != worst.run]
+        zero_of_one = measurement.one_zero
+        if zero_of_one is not None and not scaled and not shifted:
+            (run,) = zero_of_one.runs
+            shifted = {run: (zero_of_one.joint, zero_of_one.value, zero_of_one.gain)}
+            unlike = [other for other in unlike if other.run != run]
         if shifted or scaled:
             # a wrong reading of all recordings may affect one most
-            asked = sum(c.gain for c in asked_changes(measurement, seen.fits) if not c.other)
+            asked = asked_gain(measurement, seen.fits)
             shifted = {run: zero for run, zero in shifted.items() if zero[2] > asked}
             scaled = [one for one in scaled if one.gain > asked]
         measurement.odd = bool(scaled or unlike or shifted)
@@ -142,7 +147,7 @@ class OddRecording(Check):
             yield self.suspicion(
                 f"in trajectory {run} the zero of {measurement.joint(joint)} differs by about "
                 f"{np.rad2deg(angle):.0f} deg from that of the others",
-                "with this correction, the bodies of the others explain the torques of that "
+                "with this correction, common bodies explain the torques of that "
                 f"trajectory better by {gain:.0f} (log-likelihood); fix that file, or leave it out",
                 "suspected",
                 [joint],

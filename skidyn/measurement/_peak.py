@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
@@ -26,12 +27,16 @@ def peak(likelihood: Callable[[float], float], start: float, near: float) -> flo
     -------
     float
     """
-    value = start
+    at, value = cache(likelihood), start
     for _ in range(STEPS):
-        left, middle, right = (likelihood(value + step) for step in (-near, 0.0, near))
+        left, middle, right = (at(value + step) for step in (-near, 0.0, near))
         bend = 2 * middle - left - right
         step = near * (0.5 * (right - left) / bend if bend > 0 else np.sign(right - left))
-        value += float(np.clip(step, -2 * near, 2 * near))
+        step = float(np.clip(step, -2 * near, 2 * near))
         if abs(step) < CLOSE * near:
-            break
+            return value + step
+        if at(value + step) < middle:  # beyond the maximum, which may be a cusp
+            near /= 2
+        else:
+            value += step
     return value

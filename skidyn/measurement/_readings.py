@@ -60,6 +60,8 @@ NEAR, SWEEPS = np.deg2rad(1.0), 3
 OTHER_BODIES = "bodies that differ from the description"
 #: Rounds of the fits for ranking, and number of changes that are examined in detail.
 SCREENED, FINALISTS = 1, 12
+#: Angles of every joint that are tried beside loads.
+ANGLES = 3
 #: Rows of these fits at least, and at most over the number of joints.
 FEWEST_ROWS, MOST_ROWS = 150, 2800
 
@@ -122,7 +124,9 @@ def find_changes(fits: Fits) -> list[Change]:
     found: list[Change] = []
     fitted: list[int] = []
     reading = Reading()
+    rows = fits
     while len(found) < 2 * fits.n_joints:
+        fits = rows.loaded(reading)
         best = _best(fits, reading)
         if best is None:
             break
@@ -145,11 +149,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
     Few rounds select the alternatives to be examined in detail.
     """
     here, few = fits.nominal(reading), fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
-    rough = few.nominal(reading, SCREENED)
-    screened = [
-        (float(few.nominal(change.reading, SCREENED).margin(rough).sum()), change)
-        for change in _alternatives(fits, reading, here)
-    ]
+    screened = _screened(few, reading, _alternatives(fits, reading, here))
     judged = []
     for rough_gain, change in _distinct(screened)[:FINALISTS]:
         if rough_gain > 0:
@@ -178,9 +178,10 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             if kept > -TIED:
                 return replace(absent, restorable=restored > LEAST)
             judged = [c for c in judged if c.kind != "gravity"]
-    restored_change = _restored(fits, reading, here) if judged and reading.gravity is None else None
-    if restored_change is not None:
-        return restored_change
+    if (judged or fits.loads) and reading.gravity is None:
+        restored_change = _restored(fits, reading, here)
+        if restored_change is not None:
+            return restored_change
     accepted = []
     for change in judged:
         if change.kind == "no_gravity":
@@ -216,6 +217,28 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         if change.drop >= MOSTLY and angle >= NOTED:
             return _or_bodies(fits, reading, change)
     return None
+
+
+def _screened(few: Fits, reading: Reading, changes: Iterator[Change]) -> list[tuple[float, Change]]:
+    """Changes with their gains in few rows.
+
+    Loads need columns of every motion, so that beside them only the best angles are tried.
+    """
+    tried = list(changes)
+    for rows in (few.with_loads(False), few)[not few.loads :]:
+        rough = rows.nominal(reading, SCREENED)
+        gains = [float(rows.nominal(c.reading, SCREENED).margin(rough).sum()) for c in tried]
+        if rows is few:
+            break
+        angles: dict[tuple[str, tuple[int, ...]], int] = {}
+        kept = []
+        for _, change in sorted(zip(gains, tried, strict=True), key=lambda pair: -pair[0]):
+            place = (change.kind, change.joints)
+            angles[place] = angles.get(place, 0) + 1
+            if change.kind not in ("zero", "convention") or angles[place] <= ANGLES:
+                kept.append(change)
+        tried = kept
+    return list(zip(gains, tried, strict=True))
 
 
 def _by_offsets(fits: Fits, absent: Change, others: Sequence[Change]) -> Change:

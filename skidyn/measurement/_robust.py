@@ -189,6 +189,11 @@ def student(residual: Array, scale: float) -> float:
     return float(len(residual) * (constant - np.log(scale)) - (FREEDOM + 1) / 2 * spread.sum())
 
 
+def robust_weights(fit: RobustFit) -> Array:
+    """Weight of every row of a robust fit, over the square of its scale."""
+    return (FREEDOM + 1) / (FREEDOM + (fit.residual / fit.scale) ** 2) / fit.scale**2
+
+
 def robust_likelihood(residual: Array) -> float:
     """Log-likelihood of residuals at approximately the best scale."""
     scale = float(np.std(residual)) + 1e-12

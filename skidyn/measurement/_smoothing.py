@@ -21,11 +21,11 @@ from skidyn._signals import Array, Signals
 from skidyn.effects import get_effect
 from skidyn.evidence import column_step
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import running_mean, smoothed
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._robust import student
+from skidyn.measurement._rows import running_mean, smoothed
 from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._torque import measured_delay
+from skidyn.measurement._torque_delay import measured_delay
 
 #: Standard deviations of the smoothing that are tried, s (where the last one is best, the torque is
 #: merely slow), and ways of presliding, rad (a tenth in

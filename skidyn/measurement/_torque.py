@@ -3,20 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
-from skidyn.measurement._delay import Delay, RunDelay, find_delay, refined_lag
-from skidyn.measurement._drift import Drift, find_drift
 from skidyn.measurement._fits import Fits, Reading, friction
-from skidyn.measurement._late_motion import LateMotion, find_late_motion
-from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
@@ -35,39 +30,6 @@ EXPLAINED = 0.5
 USUAL = (0.4, 2.5)
 #: Factors of units of torque.
 UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
-#: Smallest delay that is reported, s, how many standard errors it must have, and how far the lag of
-#: a joint may be from it.
-SMALLEST, ERRORS, ALIKE = 0.004, 5.0, 0.006
-#: The same with positions in coarse steps, whose lag must gain as much as to be sure: their errors
-#: are not independent from row to row.
-SMALLEST_COARSE = 0.01
-#: How many standard errors lags in the halves of recordings must differ by: that there is a lag is
-#: known then.
-DRIFTING = 3.0
-#: Share of the joints whose lags must be alike, or of what they gain; friction shifts each joint by
-#: another amount.
-AGREEING = 0.75
-#: How far the lag of one joint must be from those of others, s, and how nearly it must be the same
-#: in its slower and its faster rows, as a share of it.
-APART, SAME = 0.008, 0.3
-#: Fewest other joints of known lag to compare with it, in robots that have as many, and the largest
-#: lag of these, as a share of it, if it is more than the smallest that is reported.
-FEWEST_SURE, LITTLE = 2, 0.2
-#: Log-likelihood that the lag of a single joint must gain; an unknown effect may look like one.
-ALONE = 60.0
-
-
-#: Share of the recordings that may be late by themselves, and log-likelihood that they must gain:
-#: what one carries shifts the lag of few rows, too. How many times as much they leave without it:
-#: friction that is missing is late by itself, but leaves little, and not on all joints, which need
-#: less where they agree.
-ODD, RUN_SURE, TIMES, FEWER, ALL_AGREE = 0.34, 80.0, 1.75, 1.4, 0.95
-#: Least lag, s, that may be that of a low pass, and log-likelihood by which that must be likelier
-#: than a delay. The smoothing of the motion is a low pass, too: delays up to 15 ms gain up to 60 by
-#: one, delays from 20 ms on at most 6 (ten logs of ``mistakes.py --seed 7319054``).
-FILTERED, LIKELIER = 0.017, 10.0
-#: How near a lag is to a whole number of samples that is one, s, and in samples.
-WHOLE, MOST_WHOLE = 4e-4, 0.1
 
 
 class UnsignedTorque(Check):
@@ -365,6 +327,12 @@ def asked_changes(measurement: Measurement, fits: Fits) -> list[Change]:
     return measurement.changes
 
 
+def asked_gain(measurement: Measurement, fits: Fits) -> float:
+    """Log-likelihood gain of these changes with stated or with identified bodies."""
+    asked = [c for c in asked_changes(measurement, fits) if not c.other]
+    return max(sum(c.gain for c in asked), sum(c.confirmed for c in asked))
+
+
 def _sure(changes: Iterable[Change]) -> bool:
     """Whether every change gains much, and takes off most of what the log as it is leaves."""
     return all(
@@ -390,293 +358,3 @@ def _lost_columns(measurement: Measurement) -> list[int]:
     originals = [j for _, what, j in copies if what == "torque"]  # either may be the copy
     lost = [*unsigned, *measurement.clipped, *measurement.overflowed]
     return [*lost, *copied, *originals]
-
-
-class TorqueDelay(Check):
-    """Torque that is late or early relative to the motion, equally in all joints."""
-
-    name = "torque_delay"
-    suspects = (
-        "torque that is late or early relative to the motion, or whose clock runs at a different "
-        "rate"
-    )
-    stage = 2
-
-    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        found, fits = measured_delay(measurement), readable_fits(measurement)
-        if found is None or fits is None or not np.isfinite(found.common):
-            return
-        if measurement.stale or measurement.computed or measurement.smoothed:
-            return  # held and interpolated values are always late or early
-        drift = _drift(measurement, fits, found)
-        if drift is not None or _drifts(found):
-            yield self._drifting(found, drift)
-            return
-        odd = late_runs(found)
-        for run, one in odd.items():
-            yield self.suspicion(
-                f"in trajectory {run} torque is {'late' if one.lag > 0 else 'early'} by about "
-                f"{abs(1e3 * one.lag):.0f} ms relative to the others",
-                f"at that lag it is explained better by {one.gain:.0f} (log-likelihood), "
-                f"{one.agreeing:.0%} of which is on joints that agree; fix that file, or leave it "
-                "out",
-                "suspected",
-            )
-        if odd:
-            return
-        # a joint whose own lag is uncertain agrees with any
-        use = np.isfinite(found.joints) & (found.errors < max(abs(found.common), SMALLEST))
-        # nor one whose lag is another in its faster rows, as that of a missing effect
-        slow, fast = found.halves.T
-        same = use & (np.abs(slow - fast) < np.maximum(ALIKE, SAME * np.abs(found.joints)))
-        agreeing, n_alike = _agree(found, same)
-        # if positions are late, the torque is early by the same time
-        early = measurement.late_position
-        if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
-            return
-        moved = _late_motion(measurement, fits, found)
-        if moved is not None:
-            yield self._late_motion(measurement, moved)
-            return
-        if (
-            abs(found.common) > max(SMALLEST, ERRORS * found.error)
-            and found.gain > (SURE if measurement.coarse else LEAST)
-            and abs(found.common) > _least_lag(measurement)
-            # a low pass delays faster motion less
-            and (agreeing or _agree(found, use)[0])
-        ):
-            every = range(fits.n_joints)
-            lag = refined_lag(fits, found.common, found.error, every)
-            least = LIKELIER if agreeing else SURE
-            constant = _lowpass(fits, lag, every, least) if not early else None
-            if constant is not None:
-                yield self._filtered("torque", "tau", constant, lag)
-                return
-            if not agreeing:
-                yield from self._of_joints(measurement, fits, found)
-                return
-            lag = _whole(measurement, lag)
-            if abs(lag) < SMALLEST:
-                return
-            ms = 1e3 * lag
-            if measurement.of_servos:
-                if lag < 0:
-                    yield self._late_command(-lag, found.error, n_alike)
-                return
-            late = float(f"{lag + early:.5f}")
-            yield self.suspicion(
-                f"torque is {'late' if ms > 0 else 'early'} relative to the motion by about "
-                f"{abs(ms):.1f} ms",
-                "bodies, friction and rotor inertia explain it best at that lag (standard error "
-                f"{1e3 * found.error:.1f} ms, equal in {n_alike} of "
-                f"{measurement.n_joints} joints)",
-                "suspected",
-                remedy=(f"--late tau={late:g}", f"late={{'tau': {late:g}}}"),
-            )
-            return
-        yield from self._of_joints(measurement, fits, found)
-
-    def _drifting(self, found: Delay, drift: Drift | None) -> Suspicion:
-        """Clocks with different rates."""
-        fitted, remedy = "", None
-        if drift is not None:
-            fitted = (
-                f"; a lag of {1e3 * drift.lag:.1f} ms at the beginning of every recording and "
-                f"{1e3 * drift.growth:.3g} ms more per second explain it better than a constant "
-                f"one by {drift.gain:.0f} (log-likelihood)"
-            )
-            both = (drift.lag, drift.growth)
-            remedy = (f"--late tau={drift.option}", f"late={{'tau': {both}}}")
-        return self.suspicion(
-            "the clock of the torque runs at a different rate than that of the motion",
-            f"torque is late by {1e3 * found.early:.1f} ms in the first half of the "
-            f"recordings and by {1e3 * found.late:.1f} ms in the second (standard error of "
-            f"the difference {1e3 * found.drift_error:.1f} ms){fitted}; if possible, stamp both "
-            "with one clock",
-            "suspected",
-            remedy=remedy,
-        )
-
-    def _of_joints(self, measurement: Measurement, fits: Fits, found: Delay) -> Iterator[Suspicion]:
-        """Torques of single joints that are late or early."""
-        for k in late_joints(found):
-            lag = refined_lag(fits, found.joints[k], found.errors[k], [k])
-            constant = _lowpass(fits, lag, [k])
-            if constant is not None:
-                what = f"torque of {measurement.joint(k)}"
-                yield self._filtered(what, f"tau{k + 1}", constant, lag, [k])
-                continue
-            lag = float(f"{_whole(measurement, lag):.5f}")
-            slow, fast = 1e3 * found.halves[k]
-            yield self.suspicion(
-                f"the torque of {measurement.joint(k)} is {'late' if lag > 0 else 'early'} by "
-                f"about {abs(1e3 * lag):.1f} ms, but that of other joints is not"
-                + ("" if lag > 0 else ", or its position and velocity are late"),
-                f"it is {slow:.1f} ms in its slower rows and {fast:.1f} ms in its faster rows, "
-                f"which improves the fit by {found.gains[k]:.0f} (log-likelihood)",
-                "suspected",
-                [k],
-                (f"--late tau{k + 1}={lag:g}", f"late={{'tau{k + 1}': {lag:g}}}"),
-            )
-
-    def _late_motion(self, measurement: Measurement, moved: LateMotion) -> Suspicion:
-        """Position and velocity of one joint that are late."""
-        lag, k = float(f"{_whole(measurement, moved.lag):.5f}"), moved.joint
-        late = {f"q{k + 1}": lag, f"dq{k + 1}": lag}
-        words = ",".join(f"{name}={value:g}" for name, value in late.items())
-        return self.suspicion(
-            f"position and velocity of {measurement.joint(k)} are "
-            f"{'late' if lag > 0 else 'early'} by about {abs(1e3 * lag):.1f} ms relative to those "
-            "of the other joints and to the torque",
-            "without this delay, bodies, friction and rotor inertia explain all torques better by "
-            f"{moved.gain:.0f} (log-likelihood), and with one of its torque instead by "
-            f"{moved.torque_gain:.0f}",
-            "suspected",
-            [k],
-            (f"--late {words}", f"late={late}"),
-        )
-
-    def _late_command(self, lag: float, error: float, n_alike: int) -> Suspicion:
-        """A torque of servos that is early, since commands are used before their arrival."""
-        return self.suspicion(
-            "commands reach the servos later than the controller states, by about "
-            f"{1e3 * lag:.0f} ms of delay or more",
-            "bodies, friction and rotor inertia explain the servos' torque best at that lag "
-            f"(standard error {1e3 * error:.1f} ms, equal in {n_alike} joints)",
-            "suspected",
-            remedy=("--controller fit, or its delay", "Controller(delay=...), fit_servo"),
-        )
-
-    def _filtered(
-        self, what: str, column: str, constant: float, lag: float, joints: Iterable[int] = ()
-    ) -> Suspicion:
-        evidence = (
-            "bodies, friction and rotor inertia explain it better with a first-order low-pass "
-            f"filter (time constant {1e3 * constant:.1f} ms) undone than with a delay, which "
-            f"would be {1e3 * lag:.1f} ms"
-        )
-        return suspect_lowpass(self, f"the {what}", column, constant, evidence, joints)
-
-
-def _agree(found: Delay, use: NDArray[np.bool_]) -> tuple[bool, int]:
-    """Whether the lags of some joints are alike, and how many of them are near the common one."""
-    near = max(ALIKE, 0.3 * abs(found.common))
-    alike = np.abs(found.joints[use] - found.common) < np.maximum(near, 2 * found.errors[use])
-    weight = found.gains[use] / max(float(found.gains[use].sum()), 1e-12)
-    count = int(alike.sum())
-    enough = count >= len(use) / 2 and count > len(alike) / 2
-    most = count >= AGREEING * len(alike) or float(weight[alike].sum()) >= AGREEING
-    return enough and most, count
-
-
-def _lowpass(fits: Fits, lag: float, late: Sequence[int], least: float = LIKELIER) -> float | None:
-    """Time constant of a low pass that delays torque; None if a pure delay is more likely."""
-    if lag < FILTERED:
-        return None
-    constant, gain = lowpass_of_torque(fits, lag, late)
-    return constant if gain > least else None
-
-
-def _late_motion(measurement: Measurement, fits: Fits, found: Delay) -> LateMotion | None:
-    """A single joint whose motion is late; None if a lag of torques explains as much."""
-    if measurement.of_servos or found.gains.sum() < LEAST:
-        return None  # the torque of servos follows from this motion
-    moved = find_late_motion(fits, found.common)
-    if moved is None or abs(moved.lag) < 2 * _least_lag(measurement) or moved.gain < SURE:
-        return None
-    rival = max(moved.torque_gain, float(found.gains[late_joints(found)].sum()))
-    return moved if moved.gain > rival + LEAST else None
-
-
-def _least_lag(measurement: Measurement) -> float:
-    """Smallest lag of the torque that is reported, s; coarse positions cause lags of their own."""
-    return SMALLEST_COARSE if measurement.coarse else SMALLEST
-
-
-def _whole(measurement: Measurement, lag: float) -> float:
-    """A lag, rounded to whole samples if it is close, since buffers delay by whole samples."""
-    samples = lag * measurement.rate
-    near = min(WHOLE * measurement.rate, MOST_WHOLE)
-    return (
-        float(np.round(samples)) / measurement.rate
-        if abs(samples - np.round(samples)) < near
-        else lag
-    )
-
-
-def _drifts(found: Delay) -> bool:
-    """Whether the lag is different in the halves of the recordings."""
-    drift = found.late - found.early
-    known = abs(drift) > max(SMALLEST, DRIFTING * found.drift_error)
-    return bool(known and found.gain > LEAST and _all_drift(found, drift))
-
-
-def _drift(measurement: Measurement, fits: Fits, found: Delay) -> Drift | None:
-    """Lag that grows with time, on more than a single joint; None if there is none.
-
-    Where positions jump, trajectories were cut that a file does not separate.
-    """
-    if not abs(found.late - found.early) > _least_lag(measurement) or len(measurement.leaps):
-        return None
-    drift = find_drift(fits, found)
-    if drift is None or drift.gain < SURE:
-        return None
-    most = max(drift.gains) if len(drift.gains) > 1 else 0.0
-    return drift if drift.gain - most > (1 - AGREEING) * drift.gain else None
-
-
-def _all_drift(found: Delay, drift: float) -> bool:
-    """Whether the lags of most joints change alike: a clock is that of all torques."""
-    known = np.isfinite(found.drifts)
-    weight = np.maximum(found.gains[known], 0)
-    alike = np.abs(found.drifts[known] - drift) < 0.5 * abs(drift)
-    enough = alike.sum() >= min(2, known.sum())
-    return bool(enough and weight[alike].sum() >= AGREEING * max(float(weight.sum()), 1e-12))
-
-
-def late_runs(found: Delay) -> dict[int, RunDelay]:
-    """Single recordings with late or early torque."""
-    odd = {
-        run: one
-        for run, one in found.runs.items()
-        if abs(one.lag) > max(APART, ERRORS * one.error)
-        and abs(one.usual + one.lag) > abs(one.usual)  # in time itself, it is not the odd one
-        and one.gain > RUN_SURE
-        and one.agreeing >= AGREEING
-        and one.before > (TIMES if one.agreeing < ALL_AGREE else FEWER) * one.left
-    }
-    # one that is late makes others look early
-    first = max(odd.values(), key=lambda one: one.gain, default=None)
-    odd = {r: one for r, one in odd.items() if first and one.lag * first.lag > 0}
-    return odd if len(odd) <= ODD * len(found.runs) else {}
-
-
-def late_joints(found: Delay) -> list[int]:
-    """Single joints with late or early torque, from 0.
-
-    Friction that changes late looks like a delay of its joint, but by another time if the joint is
-    faster.
-    """
-    late = []
-    for k, lag in enumerate(found.joints):
-        others = np.delete(found.joints, k)
-        sure = others[np.isfinite(others) & (np.delete(found.errors, k) < SMALLEST)]
-        if not np.isfinite(lag) or len(sure) < min(FEWEST_SURE, len(others)):
-            continue
-        common = float(np.median(sure))
-        apart = abs(lag - common) > max(APART, ERRORS * found.errors[k])
-        apart &= abs(common) < max(SMALLEST, LITTLE * abs(lag))
-        slow, fast = found.halves[k]
-        if apart and found.gains[k] > ALONE and abs(slow - fast) < SAME * abs(lag):
-            late.append(k)
-    return late if len(late) < len(found.joints) / 2 or len(found.joints) == 2 else []
-
-
-def measured_delay(measurement: Measurement) -> Delay | None:
-    """Delay of the torque of a measurement; None without a robot or rows."""
-    fits = readable_fits(measurement)
-    if fits is None:
-        return None
-    if measurement.delay is None:
-        measurement.delay = find_delay(fits)
-    return measurement.delay

@@ -343,11 +343,11 @@ def _fitted_size(
     fits = measurement.fits
     if fits is None or least < DISTANT:
         return None
-    sizes = 0.8 * least * 1.03 ** np.arange(90)  # up to a tenth of the range of the joint
+    sizes: Array = (
+        0.8 * least * np.power(1.03, np.arange(90), dtype=float)
+    )  # up to a tenth of the range of the joint
     if joints is not None:  # bodies that other joints move as well
-        few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
-        alike = [float(few.identified(_sized(x, joints)).likelihood.sum()) for x in sizes]
-        return _sharpened(fits, float(sizes[int(np.argmax(alike))]), joints)
+        return _sharpened(fits, _identified_size(fits, sizes, joints)[0], joints)
     likely = np.array([fits.nominal(_sized(x, joints), 2).likelihood.sum() for x in sizes])
     best = int(np.argmax(likely))
     far = np.abs(np.arange(len(sizes)) - best) > 4
@@ -355,10 +355,26 @@ def _fitted_size(
     there, elsewhere = (fits.nominal(_sized(x, joints), 2) for x in (sizes[best], other))
     sure = float(there.margin(elsewhere).sum()) > LEAST
     if not sure or not 0 < best < len(sizes) - 1:
-        return None
+        # beside a load or an effect, stated bodies with a scale of every torque decide little
+        size, gain = _identified_size(fits, sizes, joints)
+        inside = sizes[0] < size < sizes[-1]
+        return _sharpened(fits, size, joints) if gain > DECISIVE and inside else None
     finer = sizes[best] * 1.002 ** np.arange(-14, 15)
     likely = np.array([fits.nominal(_sized(x, joints), 2).likelihood.sum() for x in finer])
     return _sharpened(fits, float(finer[int(np.argmax(likely))]), joints)
+
+
+def _identified_size(
+    fits: Fits, sizes: Array, joints: frozenset[int] | None
+) -> tuple[float, float]:
+    """Factor of positions at which identified bodies fit best, and its gain over far ones."""
+    few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints)).with_loads()
+    fitted = [few.identified(_sized(x, joints)) for x in sizes]
+    likely = np.array([outcome.likelihood.sum() for outcome in fitted])
+    best = int(np.argmax(likely))
+    far = np.flatnonzero(np.abs(np.arange(len(sizes)) - best) > 4)
+    other = int(far[np.argmax(likely[far])])
+    return float(sizes[best]), float(fitted[best].margin(fitted[other]).sum())
 
 
 def _gained_over_degrees(
@@ -371,6 +387,7 @@ def _gained_over_degrees(
     fits = measurement.fits
     if abs(ratio * DEGREE - 1) < 0.06 or fits is None:
         return 0.0
+    fits = fits.loaded(_sized(ratio, joints))
     there, degrees = (fits.identified(_sized(x, joints)) for x in (ratio, 1 / DEGREE))
     return float(there.margin(degrees).sum())
 
@@ -384,6 +401,7 @@ def _sharpened(fits: Fits, size: float, joints: frozenset[int] | None) -> float:
 
     Gears have whole ratios, mostly round ones.
     """
+    fits = fits.loaded(_sized(size, joints))
     inflation = np.maximum(fits.identified(_sized(size, joints)).inflation, 1.0)
 
     def likelihood(log: float) -> float:

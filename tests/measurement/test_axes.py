@@ -7,7 +7,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_panda, make_hidden_effect_log
+from skidyn.datasets import load_panda, load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 from skidyn.robots import Robot
 
@@ -56,3 +56,21 @@ def test_bodies_that_mimic_others_are_left_out(log):
     assert (robot.n_joints, robot.n_bodies) == (7, 8)
     told = check_log(log.frame, turned(robot, 2, (0, 1, 0))).checks
     assert "axes" not in {s.check for s in told}
+
+
+def test_an_axis_of_a_wrist_is_told_though_friction_is_most_of_its_torque():
+    log = make_hidden_effect_log(load_ur5(), None, n_trajectories=5, duration=6.0, random_state=3)
+    claimed = turned(log.robot, 5, (0, 1, 0))
+    (told,) = [s for s in check_log(log.frame, claimed).checks if s.certainty != "noted"]
+    assert told.check == "axes" and told.joints == (5,)
+
+
+@pytest.mark.parametrize("joint", [1, 2])
+def test_of_two_equal_axes_the_usual_one_is_told_with_the_other(joint):
+    """Two joints that are parallel about x are the same arm as about z."""
+    arm = load_planar_arm()
+    log = make_hidden_effect_log(arm, None, n_trajectories=5, duration=6.0, random_state=3)
+    claimed = turned(arm, joint, (-1, 0, 0))
+    (told,) = [s for s in check_log(log.frame, claimed).checks if s.certainty != "noted"]
+    assert told.check == "axes" and told.joints == (joint,)
+    assert '<axis xyz="0 0 1"/>' in told.evidence and "equally well" in told.evidence

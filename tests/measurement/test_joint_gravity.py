@@ -3,7 +3,7 @@
 
 import pytest
 
-from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 
 ROBOT = load_ur5()
@@ -27,3 +27,12 @@ def test_one_joint_without_gravity_is_told_alone(joint):
 def test_effects_that_change_gravity_are_no_mistake(effect):
     frame = make_hidden_effect_log(ROBOT, effect, **OPTIONS).frame
     assert "joint_gravity" not in {s.check for s in told(frame)}
+
+
+def test_a_small_torque_without_gravity_is_no_scale():
+    arm = load_planar_arm()
+    frame = make_hidden_effect_log(arm, None, **OPTIONS).frame
+    pull = arm.gravity_torque(frame[["q1", "q2"]].to_numpy())
+    found = check_log(frame.assign(tau2=frame["tau2"] - pull[:, 1]), arm).checks
+    (one,) = [s for s in found if s.certainty != "noted"]
+    assert one.check == "joint_gravity" and one.joints == (2,)

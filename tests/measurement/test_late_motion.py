@@ -4,10 +4,20 @@
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_scara, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 
 ROBOT = load_ur5()
+
+
+def late(frame, joint, lag):
+    """Position and velocity of a joint that are late."""
+    frame = frame.copy()
+    for rows in frame.groupby("trajectory").groups.values():
+        time = frame.loc[rows, "time"].to_numpy()
+        for name in (f"q{joint}", f"dq{joint}"):
+            frame.loc[rows, name] = np.interp(time - lag, time, frame.loc[rows, name])
+    return frame
 
 
 @pytest.mark.parametrize("joint", [2, 4])
@@ -15,11 +25,9 @@ def test_the_motion_of_one_joint_is_late(joint):
     frame = make_hidden_effect_log(
         ROBOT, None, n_trajectories=5, duration=6.0, random_state=4
     ).frame
-    for rows in frame.groupby("trajectory").groups.values():
-        time = frame.loc[rows, "time"].to_numpy()
-        for name in (f"q{joint}", f"dq{joint}"):
-            frame.loc[rows, name] = np.interp(time - 0.025, time, frame.loc[rows, name])
-    (told,) = [s for s in check_log(frame, ROBOT).checks if s.check == "torque_delay"]
+    (told,) = [
+        s for s in check_log(late(frame, joint, 0.025), ROBOT).checks if s.check == "torque_delay"
+    ]
     assert told.joints == (joint,) and told.suspicion.startswith("position and velocity of joint")
     first, second = told.remedy.option.removeprefix("--late ").split(",")
     assert first.startswith(f"q{joint}=") and second.startswith(f"dq{joint}=")
@@ -30,3 +38,21 @@ def test_play_of_a_gear_is_no_late_motion():
     log = make_hidden_effect_log(ROBOT, "backlash", n_trajectories=5, duration=6.0, random_state=5)
     told = [s.suspicion for s in check_log(log.frame, ROBOT).checks if s.check == "torque_delay"]
     assert not any(words.startswith("position and velocity") for words in told)
+
+
+def test_a_load_of_some_recordings_does_not_hide_it():
+    log = make_hidden_effect_log(ROBOT, "payload", n_trajectories=5, duration=6.0, random_state=5)
+    told = check_log(late(log.frame, 4, 0.03), ROBOT).checks
+    (told,) = [s for s in told if s.check == "torque_delay"]
+    assert told.joints == (4,) and told.remedy.option.startswith("--late q4=0.0")
+
+
+def test_of_a_joint_that_no_other_feels_either_is_late():
+    """The torque of a slider depends on its own motion alone."""
+    robot = load_scara()
+    log = make_hidden_effect_log(robot, None, n_trajectories=5, duration=6.0, random_state=6610230)
+    (told,) = [
+        s for s in check_log(late(log.frame, 3, 0.035), robot).checks if s.check == "torque_delay"
+    ]
+    assert told.joints == (3,) and "position and velocity are late" in told.suspicion
+    assert told.remedy.option.startswith("--late tau3=-0.03")

@@ -11,6 +11,7 @@ from skidyn.measurement import (
     rest_share,
     reversals,
 )
+from skidyn.measurement._measures import velocity_consistency
 
 TIME = np.arange(2000) * 0.01
 WAVE = np.sin(TIME)
@@ -41,3 +42,13 @@ def test_rest_reversals_and_leaps():
     leaping = WAVE[:, None].copy()
     leaping[1200:] += 2.0
     assert find_leaps(leaping, TIME, np.zeros(2000, dtype=int)).tolist() == [1200]
+
+
+def test_lost_samples_near_the_others_do_not_change_the_scale_of_a_velocity():
+    t = np.arange(0, 10, 0.01)
+    q = 0.1 + 0.05 * np.sin(2 * t)
+    lost = np.random.default_rng(0).random(len(t)) < 0.004
+    slope, likeness = velocity_consistency(
+        t, np.where(lost, 0.0, q), 0.1 * np.cos(2 * t), [slice(0, len(t))]
+    )
+    assert abs(slope - 1) < 0.02 and likeness > 0.98

@@ -52,3 +52,14 @@ def test_a_load_in_half_of_the_recordings_is_no_other_zero():
     options = {"n_trajectories": 6, "duration": 5.0, "random_state": 1}
     frame = make_hidden_effect_log(ur5, "payload", **options).frame
     assert "odd_recording" not in {s.check for s in check_log(frame, ur5).checks}
+
+
+def test_a_load_of_other_recordings_does_not_hide_the_zero_of_one():
+    arm = load_planar_arm()
+    options = {"n_trajectories": 5, "duration": 6.0, "random_state": 6610327}
+    frame = make_hidden_effect_log(arm, "payload", **options).frame
+    assert not [s for s in check_log(frame, arm).checks if s.certainty != "noted"]
+    frame.loc[frame["trajectory"] == 4, "q1"] -= 0.9
+    (told,) = [s for s in check_log(frame, arm).checks if s.certainty != "noted"]
+    assert told.check == "odd_recording" and told.joints == (1,)
+    assert told.suspicion.startswith("in trajectory 4 the zero of ")

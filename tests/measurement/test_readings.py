@@ -144,3 +144,27 @@ def test_the_weight_of_a_slider_shows_along_which_axis_gravity_is():
     on_the_wall = replace(robot, gravity=np.array([9.81, 0.0, 0.0]))
     (told,) = [s for s in check_log(log.frame, on_the_wall).checks if s.certainty != "noted"]
     assert told.check == "reading" and told.remedy.option == "--gravity=0,0,-9.81"
+
+
+@pytest.mark.parametrize(
+    "load, change, option",
+    [
+        (load_scara, lambda f, r: f.assign(tau3=-f["tau3"]), "--flip tau3"),
+        (load_ur5, lambda f, r: without_gravity(f, r), "--restore-gravity"),
+    ],
+)
+def test_a_load_of_some_recordings_hides_neither_a_sign_nor_removed_gravity(load, change, option):
+    robot = load()
+    options = {"n_trajectories": 5, "duration": 6.0, "random_state": 5}
+    frame = make_hidden_effect_log(robot, "payload", **options).frame
+    told = [s for s in check_log(frame, robot).checks if s.certainty != "noted"]
+    assert not told
+    (told,) = [s for s in check_log(change(frame, robot), robot).checks if s.certainty != "noted"]
+    assert told.check == "reading" and told.remedy.option == option
+
+
+def without_gravity(frame, robot):
+    """The log without the gravity of the stated bodies."""
+    n = robot.n_joints
+    pull = robot.gravity_torque(frame[[f"q{k + 1}" for k in range(n)]].to_numpy())
+    return frame.assign(**{f"tau{k + 1}": frame[f"tau{k + 1}"] - pull[:, k] for k in range(n)})

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_scara, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_scara, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 
 
@@ -81,3 +81,17 @@ def test_angle_of_a_motor_on_one_joint(joint, short, told_of, only):
 def test_degrees_of_one_joint(short, told_of, only):
     told = told_of(short.assign(**{name: np.rad2deg(short[name]) for name in ("q2", "dq2")}))
     only(told.values(), "position_unit", "certain", "--units q2=deg,dq2=deg/s")
+
+
+@pytest.mark.parametrize(
+    "load, joints, ratio", [(load_ur5, [5], 100.0), (load_planar_arm, [1, 2], 80.0)]
+)
+def test_a_gear_is_told_from_degrees_beside_a_load(load, joints, ratio):
+    robot = load()
+    log = make_hidden_effect_log(robot, "payload", n_trajectories=5, duration=6.0, random_state=5)
+    names = [f"{q}{k}" for q in ("q", "dq") for k in joints]
+    frame = log.frame.assign(**{name: ratio * log.frame[name] for name in names})
+    (told,) = [s for s in check_log(frame, robot).checks if s.certainty == "certain"]
+    assert told.check == "position_unit" and "degrees" not in told.suspicion
+    value = float(told.remedy.option.split("=")[-1])
+    assert value == pytest.approx(1 / ratio, rel=0.02)
