@@ -65,7 +65,15 @@ def test_unknown_noise_leaves_numbers_out(missing):
 def test_when_a_torque_comes_and_goes_is_said(pushed):
     (line,) = pushed.story()["findings"]
     (episode,) = pushed.findings[0].when
-    assert line["when"] == f"from {episode.start:.1f} to {episode.end:.1f} s of trajectory 3"
+    assert line["when"] == f"acts from {episode.start:.1f} to {episode.end:.1f} s of trajectory 3"
+
+
+def test_how_an_effect_changes_is_said(missing):
+    ends = [(k, 0.0, 1 - 0.1 * k, 6.0, 0.9 - 0.1 * k) for k in range(3)]
+    term = missing.findings[0].terms[0].with_shape(course=tuple(ends))
+    finding = dataclasses.replace(missing.findings[0], terms=(term,))
+    (line,) = dataclasses.replace(missing, findings=[finding]).story()["findings"]
+    assert line["when"] == "falls steadily over the log, from the stated size to 70% of it"
 
 
 def test_confidence_is_said_where_it_is_known(missing):
