@@ -166,11 +166,13 @@ def find_axes(fits: Fits) -> list[Axis]:
         if rough_gain < 0:
             break
         other = fits.of(turned(robot, body, direction))
-        there, after = other.nominal(Reading()), other.identified(Reading())
-        gain, drop = _gained(here, there)
+        after = other.identified(Reading())
         confirmed, own = _gained(before, after)
+        if confirmed < DECISIVE:
+            continue
+        gain, drop = _gained(here, other.nominal(Reading()))
         joint = int(tree.coordinates[body])
-        stated = gain >= SURE and drop >= HALF and confirmed >= DECISIVE
+        stated = gain >= SURE and drop >= HALF
         decided = gain >= WEAKEST and confirmed >= CONFIRMED and own >= HALF
         if stated or (decided and after.margin(before)[joint] >= 0):
             found.append(Axis(joint, direction, other, gain, confirmed, max(drop, own)))

@@ -32,8 +32,8 @@ from skidyn.robots import Robot, base_parameter_index, with_whole_turns
 
 #: Nodes of a function of the position.
 PLACES = 8
-#: Samples in a row.
-SAMPLES = 6
+#: Samples in a row, and two of them whose mean is about that of all.
+SAMPLES, FEW_SAMPLES = 6, (1, 4)
 #: Columns of a joint in addition to those of the bodies: friction, rotor inertia and a constant.
 OWN = 4
 #: Log-likelihood that every coefficient of a load must gain on average: half the logarithm of some
@@ -172,7 +172,7 @@ class Fits:
     _known: dict[Reading, Outcome] = field(default_factory=dict, repr=False)
     _moved: dict[Reading, Array] = field(default_factory=dict, repr=False)
     _rubbed: dict[Reading, list[Array]] = field(default_factory=dict, repr=False)
-    _carried: dict[Reading, Array] = field(default_factory=dict, repr=False)
+    _carried: dict[tuple[Reading, int], Array] = field(default_factory=dict, repr=False)
     _parts: dict[Reading, tuple[Array, Array]] = field(default_factory=dict, repr=False)
     _fitted: dict[tuple[Any, ...], RobustFit] = field(default_factory=dict, repr=False)
     _felt: dict[Reading, list[tuple[Array, NDArray[np.int64]]]] = field(
@@ -350,7 +350,7 @@ class Fits:
             own = self.columns(motion)[:, :, joints].transpose(2, 0, 1)
             y, use = (signs * self._mean_torque[:, columns]).T, self.moving[:, columns].T
             if self.loads:
-                own, y = self._beside_loads(motion, joints, own, y, use)
+                own, y = self._beside_loads(motion, joints, own, y, use, rounds)
             found = (
                 fit_at_once(own, y, use)
                 if rounds == 1
@@ -369,21 +369,27 @@ class Fits:
         own: Array,
         y: Array,
         use: NDArray[np.bool_],
+        rounds: int,
     ) -> tuple[Array, Array]:
         """Columns and torques of joints without what a load of single recordings follows of them.
 
-        Stated bodies have no common fit of all joints, so each of these has a load of its own.
+        Stated bodies have no common fit of all joints, so each of these has a load of its own. A
+        single round only selects readings, for which two samples of a row are enough.
         """
-        if motion not in self._carried:
+        samples = FEW_SAMPLES if rounds == 1 else range(SAMPLES)
+        key = motion, len(samples)
+        if key not in self._carried:
             while len(self._carried) >= KEPT:
                 del self._carried[next(iter(self._carried))]
             robot, s = self._robot(motion), self.motion(motion)
-            felt = self.mean_regressor(robot, s, 10 * robot.n_bodies + LOAD)
-            self._carried[motion] = felt
-        felt, number = self._carried[motion], self.signals.trajectory[::SAMPLES]
+            felt = self.mean_regressor(robot, s, 10 * robot.n_bodies + LOAD, samples)
+            number = s.trajectory[::SAMPLES]
+            every = by_recording(felt.reshape(self.n_rows, -1), number)
+            self._carried[key] = every.reshape(self.n_rows, -1, *felt.shape[1:])
+        carried = self._carried[key]
         own, y = own.copy(), y.copy()
         for i, j in enumerate(joints.tolist()):
-            load = by_recording(felt[:, j], number)[use[i]]
+            load = carried[use[i], :, j].reshape(int(use[i].sum()), -1)
             basis = span(np.column_stack([load, np.ones(len(load))]))
             for values in (own[i], y[i]):
                 values[use[i]] -= basis @ (basis.T @ values[use[i]])
@@ -591,15 +597,21 @@ class Fits:
             self._felt[motion] = found
         return self._felt[motion]
 
-    def mean_regressor(self, robot: Robot, s: Signals, index: NDArray[np.int64]) -> Array:
+    def mean_regressor(
+        self,
+        robot: Robot,
+        s: Signals,
+        index: NDArray[np.int64],
+        samples: Sequence[int] = range(SAMPLES),
+    ) -> Array:
         """Some columns of the mean regressor, (n_rows, n_joints, len(index)), chunk by chunk."""
         total = np.zeros((robot.n_joints, len(index), self.n_rows))
         robot = with_whole_turns(robot)
-        for k in range(SAMPLES):  # the first samples of all rows, then the second ones
+        for k in samples:  # the first samples of all rows, then the second ones
             q, dq, ddq = (x[k::SAMPLES] for x in (s.q, s.dq, s.ddq))
             for rows, regressor in robot.iter_torque_regressor(q, dq, ddq):
                 total[:, :, rows] += regressor[:, index]
-        return np.moveaxis(total / SAMPLES, 2, 0)
+        return np.moveaxis(total / len(samples), 2, 0)
 
     def _spread(self, columns: Sequence[int], fits: Sequence[RobustFit]) -> Outcome:
         n = self.n_joints
