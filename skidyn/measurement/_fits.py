@@ -424,14 +424,24 @@ class Fits:
         return self._moved[motion]
 
     def _friction(self, motion: Reading, s: Signals) -> list[Array]:
-        """Mean columns of friction and rotor inertia, which no zero and no gravity changes."""
-        motion = replace(motion, zero=(), gravity=None)
+        """Mean columns of friction and rotor inertia, which no zero and no gravity changes.
+
+        Nor does a rate: slower motion would only blur the sign of friction.
+        """
+        motion, s = (
+            replace(motion, zero=(), gravity=None, stretch=1.0),
+            self._unstretched(motion, s),
+        )
         if motion not in self._rubbed:
             sign = np.tanh(s.dq / (SIGN_BLUR * s.unit))
             while len(self._rubbed) >= KEPT:
                 del self._rubbed[next(iter(self._rubbed))]
             self._rubbed[motion] = [self.average(x) for x in (s.dq, sign, s.ddq)]
         return self._rubbed[motion]
+
+    def _unstretched(self, motion: Reading, s: Signals) -> Signals:
+        """Motion of a reading without its other rate, which is that of friction in any case."""
+        return s if motion.stretch == 1.0 else self.motion(replace(motion, stretch=1.0))
 
     def _own_torque(self, motion: Reading, s: Signals) -> Array:
         """Mean torque of the robot as described, in rows."""
@@ -580,14 +590,14 @@ class Fits:
         if motion not in self._felt:
             self._felt.clear()
             robot, s = self._robot(motion), self.motion(motion)
-            base = base_parameter_index(robot)
+            base, rubs = base_parameter_index(robot), self._unstretched(motion, s)
             last = 10 * robot.n_bodies + LOAD if self.loads else LOAD[:0]
             regressor = self.mean_regressor(robot, s, np.append(base, last))
             number, found = s.trajectory[::SAMPLES], []
             first = len(base) + OWN * self.n_joints
             for j in range(self.n_joints):
                 felt = np.flatnonzero(regressor[:, j, : len(base)].any(axis=0))  # moved bodies
-                columns = np.hstack([regressor[:, j][:, felt], self._own_columns(s, j)])
+                columns = np.hstack([regressor[:, j][:, felt], self._own_columns(rubs, j)])
                 place = np.append(felt, len(base) + OWN * j + np.arange(OWN))
                 carried = by_recording(regressor[:, j, len(base) :], number)
                 if carried.size and regressor[:, j, len(base) :].any():
