@@ -10,6 +10,7 @@ wrong masses of the description.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -426,12 +427,11 @@ class Fits:
     def _friction(self, motion: Reading, s: Signals) -> list[Array]:
         """Mean columns of friction and rotor inertia, which no zero and no gravity changes.
 
-        Nor does a rate: slower motion would only blur the sign of friction.
+        Nor does a rate: slower motion would only blur the sign of friction. Reversed time turns it.
         """
-        motion, s = (
-            replace(motion, zero=(), gravity=None, stretch=1.0),
-            self._unstretched(motion, s),
-        )
+        s = self._unstretched(motion, s)
+        direction = math.copysign(1.0, motion.stretch)
+        motion = replace(motion, zero=(), gravity=None, stretch=direction)
         if motion not in self._rubbed:
             sign = np.tanh(s.dq / (SIGN_BLUR * s.unit))
             while len(self._rubbed) >= KEPT:
@@ -441,7 +441,8 @@ class Fits:
 
     def _unstretched(self, motion: Reading, s: Signals) -> Signals:
         """Motion of a reading without its other rate, which is that of friction in any case."""
-        return s if motion.stretch == 1.0 else self.motion(replace(motion, stretch=1.0))
+        direction = math.copysign(1.0, motion.stretch)
+        return s if motion.stretch == direction else self.motion(replace(motion, stretch=direction))
 
     def _own_torque(self, motion: Reading, s: Signals) -> Array:
         """Mean torque of the robot as described, in rows."""
