@@ -7,12 +7,18 @@ import argparse
 import json
 import shlex
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skidyn._commands._arguments import JsonFile, command, with_joints, with_report
-from skidyn._commands._controllers import controller_told, driven_with, settings_of
-from skidyn._commands._input import joint_numbers, read_driven, read_robot, recorded_options
+from skidyn._commands._controllers import controller_told, driven_with
+from skidyn._commands._input import (
+    joint_numbers,
+    read_driven,
+    read_effects,
+    read_robot,
+    recorded_options,
+    settings_of,
+)
 from skidyn._commands._output import parameters, print_json, run_diagnosis
 from skidyn._exceptions import SkidynError
 from skidyn._text import digits
@@ -51,31 +57,31 @@ def add_parser(commands: Any) -> None:
 
 
 def limited_terms(path: str, kind: str, joints: Sequence[int] | None, n_joints: int) -> list[Term]:
-    """Terms of a kind that a report limits to some recordings or times; it may be untrusted."""
+    """Terms of a kind in a report that limits some of them to recordings or times.
+
+    Empty if it limits none, or has none on some of the joints; the report may be untrusted.
+    """
     from skidyn.effects import Term, get_effect
 
     every = tuple(range(1, n_joints + 1))
-    effects = json.loads(Path(path).read_text(encoding="utf-8")).get("effects")
-    terms = []
-    for entry in effects if isinstance(effects, list) else ():
-        try:
-            on = tuple(map(int, entry["joints"]))
-            if entry["kind"] != kind or not (joints is None or set(on) & set(joints)):
-                continue
-            acts = entry.get("acts") or {}
-            when: dict[str, Any] = {}
-            if acts.get("trajectories") is not None:
-                when["trajectories"] = tuple(map(int, acts["trajectories"]))
-            for name in ("spans", "course"):
-                if acts.get(name):
-                    when[name] = tuple((int(k), *map(float, x)) for k, *x in acts[name])
-            if when:
-                terms.append(Term(kind, every if get_effect(kind).scope == "robot" else on, when))
-        except (AttributeError, KeyError, TypeError, ValueError):
-            raise SkidynError(
-                f"{path}: an entry of effects is {entry!r}; it must come from skidyn diagnose"
-            ) from None
-    return terms
+
+    def term(entry: Any) -> Term | None:
+        on = tuple(map(int, entry["joints"]))
+        if entry["kind"] != kind or not (joints is None or set(on) & set(joints)):
+            return None
+        acts = entry.get("acts") or {}
+        when: dict[str, Any] = {}
+        if acts.get("trajectories") is not None:
+            when["trajectories"] = tuple(map(int, acts["trajectories"]))
+        for name in ("spans", "course"):
+            if acts.get(name):
+                when[name] = tuple((int(k), *map(float, x)) for k, *x in acts[name])
+        return Term(kind, every if get_effect(kind).scope == "robot" else on, when)
+
+    terms = read_effects(path, term)
+    covered = {joint for found in terms for joint in found.joints}
+    limited = any(found.when for found in terms) and (joints is None or set(joints) <= covered)
+    return terms if limited else []
 
 
 def run(options: argparse.Namespace) -> None:

@@ -7,7 +7,6 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skidyn._exceptions import SkidynError
@@ -73,28 +72,6 @@ class Setting:
     def is_of(self, kind: str, joints: Sequence[int] | None) -> bool:
         """Whether it is of a kind and one of the joints; None stands for all."""
         return self.kind == kind and (joints is None or self.joint in joints)
-
-
-def settings_of(path: str) -> list[Setting]:
-    """Settings of servos among the effects of a report, which may be untrusted."""
-    from skidyn.effects import get_effect, list_effects
-
-    settings = {kind: get_effect(kind) for kind in list_effects() if get_effect(kind).of_servo}
-    report = json.loads(Path(path).read_text(encoding="utf-8"))
-    effects = report.get("effects")
-    found = []
-    for entry in effects if isinstance(effects, list) else ():
-        try:
-            if entry["kind"] not in settings:
-                continue
-            names = [c.name for c in settings[entry["kind"]].coefficients]
-            values = {name: float(entry["parameters"][name]["value"]) for name in names}
-            found.append(Setting(entry["kind"], int(entry["joints"][0]), values))
-        except (KeyError, IndexError, TypeError, ValueError):
-            raise SkidynError(
-                f"{path}: an entry of effects is {entry!r}; it must come from skidyn diagnose"
-            ) from None
-    return found
 
 
 def driven_with(

@@ -7,11 +7,12 @@ import argparse
 import json
 import re
 import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from skidyn._commands._arguments import Input, check_files
-from skidyn._commands._controllers import read_controller
+from skidyn._commands._controllers import Setting, read_controller
 from skidyn._commands._output import RECORDED, hashes, working
 from skidyn._exceptions import LogWarning, SkidynError
 from skidyn._limits import MOST_COLUMNS
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from skidyn.robots import Robot
     from skidyn.simulation import Controller
 
+#: What a function reads from an effect of a report.
+_Read = TypeVar("_Read")
 #: Remedies that are numbers by column, and those that are passed on as they are.
 NUMBERS = ("gain", "zero", "late", "lowpass")
 AS_GIVEN = (
@@ -299,6 +302,36 @@ def recorded_options(options: argparse.Namespace) -> argparse.Namespace:
     both.urdf = given.get("urdf", recorded["urdf"])
     check_files(both)
     return both
+
+
+def read_effects(path: str, read: Callable[[Any], _Read | None]) -> list[_Read]:
+    """What a function reads from the effects of a report, which may be untrusted, except None."""
+    effects = json.loads(Path(path).read_text(encoding="utf-8")).get("effects")
+    found = []
+    for entry in effects if isinstance(effects, list) else ():
+        try:
+            found.append(read(entry))
+        except (AttributeError, KeyError, IndexError, TypeError, ValueError):
+            raise SkidynError(
+                f"{path}: an entry of effects is {entry!r}; it must come from skidyn diagnose"
+            ) from None
+    return [x for x in found if x is not None]
+
+
+def settings_of(path: str) -> list[Setting]:
+    """Settings of servos among the effects of a report, which may be untrusted."""
+    from skidyn.effects import get_effect, list_effects
+
+    settings = {kind: get_effect(kind) for kind in list_effects() if get_effect(kind).of_servo}
+
+    def setting(entry: Any) -> Setting | None:
+        if entry["kind"] not in settings:
+            return None
+        names = [c.name for c in settings[entry["kind"]].coefficients]
+        values = {name: float(entry["parameters"][name]["value"]) for name in names}
+        return Setting(entry["kind"], int(entry["joints"][0]), values)
+
+    return read_effects(path, setting)
 
 
 def _found(name: str, folder: Path) -> str:

@@ -58,6 +58,17 @@ def test_what_acts_in_some_recordings_is_added_to_these(loaded, run):
     assert errors["after"][1] < 0.8 * errors["before"][1]
 
 
+def test_joints_on_which_a_report_has_no_limits_are_not_left_out(loaded, run):
+    content = json.loads((loaded / "report.json").read_text("utf-8"))
+    content["effects"] = [{"kind": "offset", "joints": [1], "acts": {"trajectories": [1]}}]
+    (loaded / "one.json").write_text(json.dumps(content), encoding="utf-8")
+    out = loaded / "offsets.json"
+    words = ("--effect", "offset", "--joints", "1,2", "--out", out)
+    assert run("add", "--from", loaded / "one.json", *words)[0] == cli.DONE
+    added = json.loads(out.read_text("utf-8"))["effects"]
+    assert {tuple(e["joints"]) for e in added if e["kind"] == "offset"} == {(1,), (2,)}
+
+
 def test_recordings_that_are_no_numbers_are_refused(loaded, capsys):
     content = json.loads((loaded / "report.json").read_text("utf-8"))
     content["effects"][0]["acts"] = {"trajectories": ["all"]}
