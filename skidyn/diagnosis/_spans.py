@@ -57,8 +57,8 @@ def span_candidates(
         return []
     scan = PartScan(tester)
     found: dict[str, list[Candidate]] = defaultdict(list)
-    passing = [k for k in kinds if get_effect(k).search == "trajectories"]
-    passing += [k for k in kinds if get_effect(k).by_recording]
+    effects = map(get_effect, kinds)
+    passing = [e.kind for e in effects if e.by_recording or e.search == "trajectories"]
     for whole in everywhere(problem, passing):
         best, drop = None, -np.inf
         (part,) = scan.parts([whole])

@@ -204,15 +204,7 @@ class Fits:
         step = self.n_rows // count
         if step < 2:
             return self
-        rows = np.arange(0, self.n_rows, step)
-        samples = (rows[:, None] * SAMPLES + np.arange(SAMPLES)).ravel()
-        recorded = replace(self.recorded, picked=self.recorded.picked[samples])
-        return self._anew(
-            signals=self.signals.take(samples),
-            torque=self.torque[samples],
-            moving=self.moving[rows],
-            recorded=recorded,
-        )
+        return self.only(np.arange(self.n_rows) % step == 0)
 
     def _anew(self, **changes: Any) -> Fits:
         """Changed rows, of which nothing has been fitted."""

@@ -16,10 +16,8 @@ import numpy as np
 from skidyn._signals import Signals
 from skidyn.measurement._delay import JointFit
 from skidyn.measurement._peak import peak
-from skidyn.measurement._score import Score
+from skidyn.measurement._score import NEAR, SLOPE, Score, likeliest_lag
 
-#: Delay for a slope, and the distance of the delays of a parabola, s.
-SLOPE, NEAR = 2e-3, 4e-3
 #: Log-likelihood that a slope must promise.
 LEAST = 8.0
 
@@ -76,9 +74,7 @@ def find_late_motion(score: Score, common: float) -> LateMotion | None:
         moved = fits.with_motion(_shifted(together.signals, k, lag))
         return score.gain(JointFit(moved, range(fits.n_joints)).fit(fits.torque))
 
-    # where a motion is late, the weights of its rows are small, and so is the first delay
-    first = max((first, 1.5 * first, 2 * first), key=of_motion)
-    lag = peak(of_motion, first, NEAR)
+    lag = likeliest_lag(of_motion, first)
     of_own, of_every = score.gain_of_torque([k]), score.gain_of_torque(range(fits.n_joints))
     own, every = of_own(peak(of_own, -lag, NEAR)), of_every(peak(of_every, common, NEAR))
     return LateMotion(k, lag, of_motion(lag), own, every)

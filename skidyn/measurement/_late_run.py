@@ -12,11 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from skidyn.measurement._fits import SAMPLES
-from skidyn.measurement._peak import peak
-from skidyn.measurement._score import Score
+from skidyn.measurement._score import SLOPE, Score, likeliest_lag
 
-#: Lag for a slope, and the distance of the lags of a parabola, s.
-SLOPE, NEAR = 2e-3, 4e-3
 #: Log-likelihood that a recording must promise, how many times as much as any other, and fewest
 #: recordings.
 LEAST, TIMES, RECORDINGS = 10.0, 3.0, 3
@@ -69,7 +66,5 @@ def find_late_run(score: Score) -> LateRun | None:
     def of_run(lag: float) -> float:
         return of_torque(np.where(rows, lag, 0.0))
 
-    first = promised[run][1]
-    first = max((first, 1.5 * first, 2 * first), key=of_run)
-    lag = peak(of_run, first, NEAR)
+    lag = likeliest_lag(of_run, promised[run][1])
     return LateRun(run, lag, of_run(lag), of_torque(lag))

@@ -39,7 +39,7 @@ def by_recording(columns: Array, number: NDArray[np.int64]) -> Array:
     Returns
     -------
     ndarray of shape (n_rows, n_columns * (n_recordings - 1))
-        None for a single recording, or for more than may carry loads of their own.
+        No columns for a single recording, or for more than may carry loads of their own.
     """
     runs = np.unique(number) if n_loads(number) else number[:1]
     rows = [(number == run)[:, None] for run in runs[1:]]

@@ -15,8 +15,11 @@ from skidyn._signals import Array
 from skidyn.measurement._delay import JointFit
 from skidyn.measurement._fits import Fits
 from skidyn.measurement._near_bodies import Factored
+from skidyn.measurement._peak import peak
 from skidyn.measurement._robust import RobustFit, robust_weights
 
+#: Lag for a slope, and the distance of the lags of a parabola, s.
+SLOPE, NEAR = 2e-3, 4e-3
 #: Least share of a column that the others do not follow.
 ALONE = 1e-6
 
@@ -81,3 +84,17 @@ class Score:
         """Log-likelihood gain as a function of the lag of some torques, s."""
         changed = self.together.changing(late)
         return lambda lag: self.gain(changed.fit(self.fits.torque_at(lag)))
+
+
+def likeliest_lag(gain: Callable[[float], float], first: float) -> float:
+    """Lag of the largest log-likelihood gain, s.
+
+    Parameters
+    ----------
+    gain : callable
+        Gain as a function of the lag, s.
+    first : float, s
+        Lag that a slope promises: too small where something is late, since the weights of its rows
+        are small.
+    """
+    return peak(gain, max((first, 1.5 * first, 2 * first), key=gain), NEAR)
