@@ -74,13 +74,15 @@ def match_names(
     robot_joints: Sequence[str] | None = None,
     columns: Mapping[str, str | int | Sequence[str | int]] | None = None,
     source: str = "the log",
+    listed: Mapping[str, Sequence[str]] | None = None,
 ) -> NameMatch:
     """Assign the unique columns of a source to signals, in the order of the robot's joints.
 
     ``columns`` are the user's, which have priority over any guess: ``{"q1": "pos_a"}``, ``{"q":
     ["pos_a", "pos_b"]}``, ``{"q": "pos_{joint}"}`` or ``{"q": "pos_{i}"}`` (from 0 or 1, as the
-    columns are); a number is the position of a column. A LogError is raised if one is absent, or
-    joints do not match the robot.
+    columns are); a number is the position of a column. ``listed`` are the joints that the source
+    lists beside numbered columns, in their order, by column. A LogError is raised if a column is
+    absent, or joints do not match the robot.
     """
     _refuse_too_many(names, source)
     match = NameMatch()
@@ -101,7 +103,11 @@ def match_names(
         indexed, named = by_index.get(quantity, _Found()), by_joint.get(quantity, _Found())
         if indexed:
             indexed.refuse_choice(quantity, source)
-            _place_by_index(match, quantity, indexed)
+            by_name = _with_joints(indexed, listed or {}, robot_joints, match.notes)
+            if by_name is None:
+                _place_by_index(match, quantity, indexed)
+            else:
+                _place_by_joint(match, quantity, by_name, robot_joints, source)
         elif named and (robot_joints is not None or "q" not in by_index):
             named.refuse_choice(quantity, source)
             _place_by_joint(match, quantity, named, robot_joints, source)
@@ -309,6 +315,41 @@ def _place_by_index(match: NameMatch, quantity: str, found: Mapping[int, str]) -
     shift = 1 if 0 in found else 0
     for index, name in sorted(found.items()):
         match.columns[f"{quantity}{index + shift}"] = name
+
+
+def _with_joints(
+    found: Mapping[int, str],
+    listed: Mapping[str, Sequence[str]],
+    robot_joints: Sequence[str] | None,
+    notes: list[str],
+) -> dict[str, str] | None:
+    """Numbered columns by the joints that their source lists; None if it lists no names of use.
+
+    Names of which none belongs to a joint of the robot, or some to the joint at their own place,
+    are taken in their order, which is noted.
+    """
+    shift = 1 if 0 in found else 0
+    named: dict[str, str] = {}
+    for index, column in sorted(found.items()):
+        joints = listed.get(column, ())
+        if not 1 <= index + shift <= len(joints):
+            return None
+        named[joints[index + shift - 1]] = column
+    if len(named) < len(found):
+        return None
+    located = [] if robot_joints is None else list(_located(robot_joints, named).values())
+    if robot_joints is None or all(located):
+        return named
+    in_place = [hit is None or hit == name for hit, name in zip(located, named, strict=False)]
+    if len(named) != len(located) or not all(in_place):
+        return named if any(located) else None
+    note = (
+        f"the joints that the log lists ({_listed(named)}) have other names in the description "
+        f"({_listed(robot_joints)}); they are taken in their order"
+    )
+    if note not in notes:
+        notes.append(note)
+    return None
 
 
 def _place_by_joint(

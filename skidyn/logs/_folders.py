@@ -140,7 +140,12 @@ def _as_signal(channel: Channel, file: Path) -> Channel:
     if ahead is not None and str(ahead).lower() in ("", "index", "unnamed: 0"):
         numeric = numeric[1:]
     names = {name: f"{quantity}{k + 1}" for k, name in enumerate(numeric)}
-    return replace(channel, table=channel.table.rename(columns=names))
+    attributes = channel.attributes
+    if not any(found[name] is not None or str(name).isdigit() for name in numeric):
+        # the header names joints
+        header = [str(name) for name in numeric]
+        attributes = attributes | {"headers": dict.fromkeys(names.values(), header)}
+    return replace(channel, table=channel.table.rename(columns=names), attributes=attributes)
 
 
 def _side_by_side(channels: Sequence[Channel]) -> list[Channel]:
@@ -152,6 +157,9 @@ def _side_by_side(channels: Sequence[Channel]) -> list[Channel]:
 
     clocked = [c for c in channels if has_clock(c)] or list(channels[:1])
     joined: dict[int, list[Any]] = {id(c): [c.table] for c in clocked}
+    headers: dict[int, dict[str, list[str]]] = {
+        id(c): dict(c.attributes.get("headers", {})) for c in clocked
+    }
     for channel in channels:
         if channel in clocked:
             continue
@@ -163,9 +171,12 @@ def _side_by_side(channels: Sequence[Channel]) -> list[Channel]:
                 "cannot be determined."
             )
         joined[id(partner)].append(channel.table.reset_index(drop=True))
+        headers[id(partner)] |= channel.attributes.get("headers", {})
     return [
         replace(
-            c, table=pandas.concat(joined[id(c)], axis=1) if len(joined[id(c)]) > 1 else c.table
+            c,
+            table=pandas.concat(joined[id(c)], axis=1) if len(joined[id(c)]) > 1 else c.table,
+            attributes=c.attributes | {"headers": headers[id(c)]},
         )
         for c in clocked
     ]

@@ -78,6 +78,7 @@ def build_table(
         robot_joints=None if options.robot is None else options.robot.joint_names,
         columns=options.columns,
         source=source,
+        listed=_listed_joints(channels),
     )
     refuse_stated_units(match.units, options.units or {}, source)
     tables = [_renamed(channel, match, source, options) for channel in channels]
@@ -88,10 +89,21 @@ def build_table(
         table = _torque_from_current(table, n, options.drive_gains, source)
     require_columns(table, n, options.needed, source)
     stated = [c.attributes["joint_names"] for c in channels if "joint_names" in c.attributes]
-    if options.robot is None and stated and len(stated[0]) == n:
+    by_number = match.joint_names == [str(k + 1) for k in range(n)]
+    if options.robot is None and by_number and stated and len(stated[0]) == n:
         match.joint_names = list(stated[0])
     table = mend_columns(table, n, match.joint_names, options.remedies, match.notes)
     return _in_order(_clean(table, n, match, source, options), n), match
+
+
+def _listed_joints(channels: Sequence[Channel]) -> dict[str, Sequence[str]]:
+    """Joints that files list for their numbered columns, in their order, by column."""
+    listed: dict[str, Sequence[str]] = {}
+    for channel in channels:
+        if names := channel.attributes.get("joint_names"):
+            listed |= dict.fromkeys(map(str, channel.table.columns), names)
+        listed |= channel.attributes.get("headers", {})
+    return listed
 
 
 def _renamed(
@@ -100,7 +112,11 @@ def _renamed(
     """The numeric columns of a channel under the names of a log, in SI units."""
     new_name = {old: new for new, old in match.columns.items()}
     # a column that was not chosen must not have the name of a signal
-    new_name |= {n: f"{n} of the file" for n in match.columns if n not in new_name}
+    new_name |= {
+        str(n): f"{n} of the file"
+        for n in channel.table.columns
+        if str(n) not in new_name and _quantity(str(n)) is not None
+    }
     table = channel.table.rename(columns=lambda name: new_name.get(str(name), str(name)))
     table["time"] = seconds(table, options.rate, f"{source} ({channel.name})")
     signals = [name for name in table.columns if _quantity(name) is not None]

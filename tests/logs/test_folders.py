@@ -71,6 +71,45 @@ def test_one_file_per_signal(tmp_path):
     same(read_log(tmp_path, check=False), RUN, ("time", "q1", "dq2", "tau2"))
 
 
+def test_listed_joints_determine_the_order_of_the_columns(tmp_path):
+    robot = load_planar_arm()
+    turned = RUN.rename(columns={f"{q}{k}": f"{q}{3 - k}" for q in ("q", "tau") for k in (1, 2)})
+    (tmp_path / "lists").mkdir()
+    as_lists(turned).to_csv(tmp_path / "lists" / "state.csv", index=False)
+    names = tmp_path / "lists" / "joint_list.txt"
+    names.write_text("joint2\njoint1\n")
+    same(read_log(tmp_path / "lists", robot=robot, check=False), RUN)
+    names.write_text("elbow\nshoulder\n")
+    frame = read_log(tmp_path / "lists", robot=robot, check=False)
+    same(frame, turned)
+    assert any("other names in the description" in note for note in frame.attrs["notes"])
+    names.write_text("joint2\nelbow\n")  # one name is known, at the place of another joint
+    with pytest.raises(LogError, match=r"no q of the joint\(s\) joint1"):
+        read_log(tmp_path / "lists", robot=robot, check=False)
+    (tmp_path / "header").mkdir()
+    RUN[["time"]].to_csv(tmp_path / "header" / "time.csv", index=False)
+    for name, quantity, joints in (("positions", "q", (1, 2)), ("torques", "tau", (2, 1))):
+        block = RUN[[f"{quantity}{k}" for k in joints]]
+        block.columns = [f"joint{k}" for k in joints]
+        block.to_csv(tmp_path / "header" / f"{name}.csv", index=False)
+    for known in (robot, None):
+        same(read_log(tmp_path / "header", robot=known, check=False), RUN)
+
+
+def test_listed_joints_that_the_robot_lacks_are_left_aside(tmp_path):
+    wide = RUN.assign(q3=0.0, tau3=0.0)
+    np.savez(
+        tmp_path / "log.npz",
+        time=RUN["time"],
+        joint_names=["gripper", "joint1", "joint2"],
+        q=wide[["q3", "q1", "q2"]],
+        tau=wide[["tau3", "tau1", "tau2"]],
+    )
+    frame = read_log(tmp_path / "log.npz", robot=load_planar_arm(), check=False)
+    same(frame, RUN)
+    assert any("belong to no joint of the robot" in note for note in frame.attrs["notes"])
+
+
 def test_files_of_differing_length_are_refused(tmp_path):
     RUN[["time", "q1", "q2"]].to_csv(tmp_path / "positions.csv", index=False)
     RUN[["tau1", "tau2"]].iloc[:-5].to_csv(tmp_path / "torques.csv", index=False)
