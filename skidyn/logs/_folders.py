@@ -67,6 +67,16 @@ def find_runs(path: str | os.PathLike[str]) -> list[Run]:
     return runs
 
 
+def files_of(path: str | os.PathLike[str]) -> list[Path]:
+    """Files that :func:`find_runs` finds, those of bags one by one; none if it finds nothing."""
+    try:
+        files = [file for run in find_runs(path) for file in run.files]
+    except LogError:
+        return []
+    inside = [sorted(file.rglob("*")) if file.is_dir() else [file] for file in files]
+    return [file for part in inside for file in part if file.is_file()]
+
+
 def _holds_logs(folder: Path) -> bool:
     files = [*folder.iterdir(), *folder.glob("*/*")]
     return any(suffix_of(f) in known_suffixes() or f.name == "metadata.yaml" for f in files)
