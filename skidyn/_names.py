@@ -191,6 +191,8 @@ def _expand(
             raise LogError(f"columns: no column matches {value!r}. There are: {_listed(names)}.")
         return list(found)
     value = value.replace("{i}", "{index}")
+    if value not in names and any(f"{value}{k}" in names for k in (0, 1)):
+        value += "{index}"  # a column of lists, which became one column per joint
     if "{index}" in value:
         known = set(names)
         first = 0 if value.replace("{index}", "0") in known else 1

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -19,13 +19,30 @@ if TYPE_CHECKING:
 SLOWER = 1.75
 
 
-def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
-    """Clock of a table as float64: its time column, or row number over rate.
+def clocks(
+    tables: Sequence[pd.DataFrame], rate: float | None, sources: Sequence[str]
+) -> list[np.ndarray]:
+    """Clocks of the channels of a file as float64: their time columns, or row number over rate.
 
     ``time`` may hold numbers, in the unit of the source, or dates, which become seconds from the
-    first row, or text of either. ``source`` is the name in the LogError for a clock that is missing
-    or cannot be read, or an invalid rate.
+    first row of the earliest channel, or text of either. ``sources`` are the names in the LogError
+    for a clock that is missing or cannot be read, or an invalid rate.
     """
+    read = [_clock(table, rate, source) for table, source in zip(tables, sources, strict=True)]
+    begins = [begin for _, begin in read if begin is not None]
+    if len(begins) < 2 or len({type(begin) for begin in begins}) > 1:
+        return [since for since, _ in read]
+    return [since if begin is None else since + _apart(begin, min(begins)) for since, begin in read]
+
+
+def _apart(begin: Any, earliest: Any) -> float:
+    """Time from the earliest first stamp to another one."""
+    apart = begin - earliest
+    return float(apart) if isinstance(apart, int) else float(apart.total_seconds())
+
+
+def _clock(table: pd.DataFrame, rate: float | None, source: str) -> tuple[np.ndarray, Any]:
+    """Clock of one table, and the stamp from which it counts; None if it begins at its own zero."""
     import pandas
 
     if "time" not in table.columns:
@@ -36,20 +53,23 @@ def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
             )
         if not (np.isfinite(rate) and rate > 0):
             raise LogError(f"rate is {rate}; expected a rate in Hz above zero.")
-        return np.arange(len(table)) / rate
+        return np.arange(len(table)) / rate, None
     column = table["time"]
     if column.dtype.kind in "iu" and len(column) and abs(int(column.iloc[0])) > 2**53:
         # nanoseconds since 1970 do not fit a float64 to the nanosecond; differences do
         since: np.ndarray = column.to_numpy() - column.iloc[0]
-        return since.astype(np.float64)
+        return since.astype(np.float64), int(column.iloc[0])
     if column.dtype.kind == "m":
-        since = (column - column.iloc[0]).dt.total_seconds().to_numpy()
-        return np.asarray(since, dtype=np.float64)
+        return _since(column)
     if column.dtype.kind in "fiu":
-        return np.asarray(column, dtype=np.float64)
+        return np.asarray(column, dtype=np.float64), None
     if not _is_date(column):  # pandas converts dates to numbers in its own unit
         try:
-            return np.asarray(pandas.to_numeric(column), dtype=np.float64)
+            return np.asarray(pandas.to_numeric(column), dtype=np.float64), None
+        except (TypeError, ValueError):
+            pass
+        try:  # durations such as 0 days 00:00:01.25
+            return _since(pandas.to_timedelta(column))
         except (TypeError, ValueError):
             pass
     try:
@@ -60,7 +80,16 @@ def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
         raise LogError(
             f"{source}: the time column holds neither numbers nor dates: {error}"
         ) from None
-    return np.asarray((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=np.float64)
+    return _since(stamps)
+
+
+def _since(stamps: pd.Series) -> tuple[np.ndarray, Any]:
+    """Seconds since the first of some dates or durations, and this first one."""
+    import pandas
+
+    first = stamps.iloc[0] if len(stamps) else None
+    since = np.asarray((stamps - first).dt.total_seconds(), dtype=np.float64)
+    return since, None if pandas.isna(first) else first
 
 
 def _is_date(column: pd.Series) -> bool:

@@ -24,8 +24,8 @@ from skidyn._names import NameMatch, match_names
 from skidyn._units import convert_units, refuse_stated_units
 from skidyn.logs._clock import (
     align_channels,
+    clocks,
     derive_velocity,
-    seconds,
     split_at_restarts,
     split_trajectories,
 )
@@ -81,7 +81,12 @@ def build_table(
         listed=_listed_joints(channels),
     )
     refuse_stated_units(match.units, options.units or {}, source)
-    tables = [_renamed(channel, match, source, options) for channel in channels]
+    tables = [_renamed(channel, match) for channel in channels]
+    times = clocks(tables, options.rate, [f"{source} ({c.name})" for c in channels])
+    tables = [
+        _in_si(table.assign(time=time), match, source, options)
+        for table, time in zip(tables, times, strict=True)
+    ]
     _refuse_unused_units(tables, options.units or {}, source)
     table = align_channels(tables, [c.name for c in channels], options.resample_rate, match.notes)
     n = count_joints(table, source)
@@ -106,10 +111,8 @@ def _listed_joints(channels: Sequence[Channel]) -> dict[str, Sequence[str]]:
     return listed
 
 
-def _renamed(
-    channel: Channel, match: NameMatch, source: str, options: TableOptions
-) -> pd.DataFrame:
-    """The numeric columns of a channel under the names of a log, in SI units."""
+def _renamed(channel: Channel, match: NameMatch) -> pd.DataFrame:
+    """The columns of a channel under the names of a log."""
     new_name = {old: new for new, old in match.columns.items()}
     # a column that was not chosen must not have the name of a signal
     new_name |= {
@@ -117,8 +120,13 @@ def _renamed(
         for n in channel.table.columns
         if str(n) not in new_name and _quantity(str(n)) is not None
     }
-    table = channel.table.rename(columns=lambda name: new_name.get(str(name), str(name)))
-    table["time"] = seconds(table, options.rate, f"{source} ({channel.name})")
+    return channel.table.rename(columns=lambda name: new_name.get(str(name), str(name)))
+
+
+def _in_si(
+    table: pd.DataFrame, match: NameMatch, source: str, options: TableOptions
+) -> pd.DataFrame:
+    """The numeric columns of a table, in SI units."""
     signals = [name for name in table.columns if _quantity(name) is not None]
     table = as_numbers(table, signals, source)
     kept = [name for name in table.columns if table[name].dtype.kind in "fiub"]

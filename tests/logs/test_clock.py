@@ -40,6 +40,28 @@ def test_nanoseconds_since_1970_keep_their_differences(read):
     np.testing.assert_allclose(np.diff(log["time"]), 1.000001e-3, rtol=1e-9)
 
 
+def test_durations_as_text(read):
+    log, _ = read(pd.DataFrame({"time": pd.to_timedelta([5.0, 5.01, 5.02], unit="s"), "q1": 0.0}))
+    np.testing.assert_allclose(log["time"], [0.0, 0.01, 0.02])
+
+
+@pytest.mark.parametrize("kind", ["ns", "dates", "durations"])
+def test_channels_keep_the_distance_of_their_first_stamps(tmp_path, kind):
+    time = np.arange(200) * 0.01
+    stamps = 1_700_000_000_000_000_000 + np.arange(200) * 10_000_000
+    if kind != "ns":
+        to_time = pd.to_datetime if kind == "dates" else pd.to_timedelta
+        stamps = to_time(stamps)
+    table = pd.DataFrame({"time": stamps, "q1": np.sin(time), "tau1": time})
+    table[["time", "q1"]].to_csv(tmp_path / "q.csv", index=False)
+    table.loc[50:, ["time", "tau1"]].to_csv(tmp_path / "tau.csv", index=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        units = {"time": "ns"} if kind == "ns" else None
+        log = read_log(tmp_path, units=units, check=False)
+    np.testing.assert_allclose(log["q1"], np.sin(log["tau1"]), atol=1e-9)
+
+
 def test_unreadable_clock(read):
     with pytest.raises(LogError, match="neither numbers nor dates"):
         read(pd.DataFrame({"time": ["noon", "later"], "q1": 0.0}))

@@ -41,6 +41,27 @@ def test_columns_that_hold_lists(tmp_path):
     same(read_log(tmp_path / "log.csv", check=False), RUN)
 
 
+def test_lists_of_words_stay_text_and_empty_cells_are_missing_values(tmp_path):
+    table = as_lists(RUN).assign(name=str(["left", "right"]))
+    table.loc[[0, 7], "torques"] = None
+    table["positions"] = [json.dumps([str(x) for x in row]) for row in lists(RUN, "q")]
+    table.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(
+        LogError, match=r"2 of 300 rows hold NaN .*tau1: 2, tau2: 2; first in row 0"
+    ):
+        read_log(tmp_path / "log.csv", check=False)
+    frame = read_log(tmp_path / "log.csv", missing="drop", check=False)
+    same(frame, RUN.drop(index=[0, 7]))
+    assert any("without numbers left out: name" in note for note in frame.attrs["notes"])
+
+
+def test_a_column_of_lists_is_chosen_by_its_name(tmp_path):
+    names = {"timestamp": "clock", "positions": "A", "torques": "B"}
+    as_lists(RUN).rename(columns=names).to_csv(tmp_path / "log.csv", index=False)
+    columns = {"time": "clock", "q": "A", "tau": "B"}
+    same(read_log(tmp_path / "log.csv", columns=columns, check=False), RUN)
+
+
 def test_a_cell_that_is_no_list_is_named(tmp_path):
     table = as_lists(RUN)
     table.loc[7, "torques"] = "stopped"
