@@ -117,7 +117,8 @@ def match_names(
             f"{source} has {n} joints ({_listed(match.joint_names) or 'by number'}), the robot has "
             f"{len(robot_joints)} ({_listed(robot_joints)}). If the log covers part of the robot, "
             "load it with Robot.from_urdf(..., joints=[...]); if it has further joints, select "
-            "the columns with columns={'q': [...], 'dq': [...], 'tau': [...]}."
+            "the columns with columns={'q': [...], 'dq': [...], 'tau': [...]}. On the command "
+            "line: --joints NAME,..; --columns 'q=...{i},dq=...{i},tau=...{i}'."
         )
     if n > max(len(names), MANY_JOINTS):
         raise LogError(
@@ -379,7 +380,8 @@ def _place_by_joint(
             f"{source} has no {quantity} of the joint(s) {_listed(missing)}{hint}; it has "
             f"{_listed(found)}. If the log covers part of the robot, load it with "
             "Robot.from_urdf(..., joints=[...]); if joints have other names, give "
-            f"columns={{'{quantity}': [...]}} in the order of the robot."
+            f"columns={{'{quantity}': [...]}} in the order of the robot (--joints and --columns on "
+            "the command line)."
         )
     match.joint_names = list(robot_joints)
     used = set(located.values())

@@ -82,7 +82,8 @@ def refuse_stated_units(
         example = example or f"column {name!r} states {unit}"
     if wanted:
         raise LogError(
-            f"{source}: {example}; a log is in SI units. To convert it, pass units={wanted}."
+            f"{source}: {example}; a log is in SI units. To convert it, pass units={wanted} "
+            f"(--units {','.join(map('='.join, wanted.items()))} on the command line)."
         )
 
 

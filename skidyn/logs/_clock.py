@@ -10,6 +10,7 @@ import numpy as np
 
 from skidyn._exceptions import LogError
 from skidyn._signals import GAP_STEPS, find_segments
+from skidyn.logs._bounds import MAX_BYTES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,6 +36,16 @@ def clocks(
     return [since if begin is None else since + _apart(begin, min(begins)) for since, begin in read]
 
 
+def _by_position(table: pd.DataFrame) -> str:
+    """How columns of a file without a header are chosen; empty for one with a header."""
+    if not all(str(name).isdigit() for name in table.columns):
+        return ""
+    return (
+        " The file has no header: give the positions of columns, from 0, as in --columns "
+        "time=0,q=1-6,tau=13-18 (in Python: columns={'time': 0, 'q': [1, ...]})."
+    )
+
+
 def _apart(begin: Any, earliest: Any) -> float:
     """Time from the earliest first stamp to another one."""
     apart = begin - earliest
@@ -48,8 +59,9 @@ def _clock(table: pd.DataFrame, rate: float | None, source: str) -> tuple[np.nda
     if "time" not in table.columns:
         if rate is None:
             raise LogError(
-                f"{source} has no time column. Name it with columns={{'time': ...}}, or pass rate= "
-                f"(Hz) if sampling is regular. It has: {', '.join(map(str, table.columns))}."
+                f"{source} has no time column. Name it with --columns time=NAME (in Python: "
+                "columns={'time': NAME}), or give --rate (rate=) in Hz if sampling is regular. It "
+                f"has: {', '.join(map(str, table.columns))}.{_by_position(table)}"
             )
         if not (np.isfinite(rate) and rate > 0):
             raise LogError(f"rate is {rate}; expected a rate in Hz above zero.")
@@ -130,7 +142,8 @@ def align_channels(
         for column in table.columns:
             if column != "time" and owner.setdefault(column, name) != name:
                 raise LogError(
-                    f"{column} is in {owner[column]} and in {name}; choose one with topics=[...]."
+                    f"{column} is in {owner[column]} and in {name}; choose one with "
+                    "topics=[...] (--topics on the command line)."
                 )
         restarts = np.flatnonzero(np.diff(table["time"].to_numpy()) < 0)
         if len(restarts):
@@ -146,6 +159,8 @@ def align_channels(
             for t, name in zip(tables, names, strict=True)
         )
         raise LogError(f"the channels do not overlap in time ({spans}).")
+    if rate is not None:
+        _refuse_too_fast(np.array([begin, end]), rate, sum(len(t.columns) for t in tables))
     base = next((k for k, table in enumerate(tables) if "q1" in table.columns), 0)
     clock = tables[base]["time"].to_numpy() if rate is None else np.arange(begin, end, 1 / rate)
     common = (clock >= begin) & (clock <= end)
@@ -177,6 +192,7 @@ def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFra
     import pandas
 
     time = table["time"].to_numpy()
+    _refuse_too_fast(time, rate, len(table.columns))
     run = np.zeros(len(time), dtype=np.int64)
     run[1:] = np.cumsum(np.diff(time) < 0)
     if "trajectory" in table.columns:
@@ -199,6 +215,17 @@ def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFra
     notes.append(f"{how} to {rate:g} Hz within {len(parts)} run(s) without a gap{alone}")
     regular: pd.DataFrame = pandas.concat(parts, ignore_index=True)
     return regular
+
+
+def _refuse_too_fast(time: np.ndarray, rate: float, n_columns: int) -> None:
+    """Refuse a rate at which the log would not fit the bound of a file in memory."""
+    last, first = float(np.max(time, initial=-np.inf)), float(np.min(time, initial=np.inf))
+    rows = max(0.0, last - first) * rate
+    if 8 * rows * n_columns > MAX_BYTES:
+        raise LogError(
+            f"resample_rate is {rate:g} Hz, at which the log would have {rows:.3g} rows; give a "
+            "rate in Hz near the recorded one."
+        )
 
 
 def _in_gap(time: np.ndarray, clock: np.ndarray) -> np.ndarray:

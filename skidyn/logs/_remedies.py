@@ -38,6 +38,8 @@ REMEDIES = (
     "split_leaps:",
     "restore_gravity:",
     "derive:",
+    "unwrap:",
+    "missing:",
 )
 
 
@@ -352,7 +354,8 @@ def _sign_from_command(table: pd.DataFrame, n: int, notes: list[str]) -> None:
     if absent:
         raise LogError(
             f"torque_sign='command' needs the commanded positions; the log has no "
-            f"{', '.join(absent)}. Name them with columns={{'cmd': [...]}}."
+            f"{', '.join(absent)}. Name them with --columns 'cmd=goal_{{i}}' (in Python: "
+            "columns={'cmd': [...]})."
         )
     turned, signless = 0, 0
     for k in range(1, n + 1):

@@ -17,7 +17,6 @@ from skidyn._checks import (
     count_joints,
     handle_missing,
     require_columns,
-    warn_about_log,
 )
 from skidyn._exceptions import LogError
 from skidyn._names import NameMatch, match_names
@@ -184,7 +183,8 @@ def _torque_from_current(
     if not has_current:
         raise LogError(
             f"drive_gains is given, but {source} has no currents i1..i{n}. If its torque columns "
-            "are currents, say so with columns={'i': [...]}."
+            "are currents, say so with columns={'i': [...]} (--columns 'i=name{i}' on the "
+            "command line)."
         )
     try:
         factors = np.asarray(gains, dtype=float)
@@ -206,7 +206,7 @@ def _clean(
     own_trajectories = "trajectory" in table.columns
     signals = [name for name in table.columns if SIGNAL_COLUMN.fullmatch(name)]
     keys = ["time", "trajectory"] if own_trajectories else ["time"]
-    table = handle_missing(table, [*keys, *signals], options.missing, source)
+    table = handle_missing(table, [*keys, *signals], options.missing, match.notes, source)
     if len(table) < 2:
         raise LogError(f"{source} has {len(table)} row(s); a log needs at least two.")
     time = table["time"].to_numpy()
@@ -237,7 +237,7 @@ def _clean(
     keep = check_time_order(time, number, source)
     if not keep.all() and not _same_stamps(table, n, number, source, options):
         first = int(np.argmin(keep))
-        warn_about_log(
+        match.notes.append(
             f"{source}: {int((~keep).sum())} of {len(keep)} rows repeat the time of the previous "
             f"row (first in row {first}); the first of each is kept."
         )

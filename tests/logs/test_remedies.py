@@ -276,6 +276,11 @@ def test_sums_that_cannot_be_taken_apart(read, summed, message):
         read(LOG, summed=summed)
 
 
+def test_a_rate_that_fills_the_memory_is_refused(read):
+    with pytest.raises(LogError, match="resample_rate is 1e\\+12 Hz, at which the log would have"):
+        read(LOG, resample_rate=1e12)
+
+
 @pytest.mark.parametrize("rate", [0.0, -5.0, np.nan, np.inf])
 def test_rates_that_are_none(read, rate):
     with pytest.raises(LogError, match="above zero"):
