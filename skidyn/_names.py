@@ -35,7 +35,9 @@ SPELLINGS: dict[str, tuple[str, ...]] = {
     + ("observationcurrent",),
     "temp": ("temp", "temperature", "temperatures", "jointtemperature", "motortemperature"),
     "cmd": ("cmd", "command", "commands", "commandedposition", "positioncommand", "qcmd", "qdes")
-    + ("qdesired", "desiredposition", "targetposition", "setpoint", "qref", "action", "control"),
+    + ("qdesired", "desiredposition", "targetposition", "setpoint", "qref", "action", "control")
+    + ("targetq", "qtarget", "goalposition", "goalpos", "referenceposition", "desiredq")
+    + ("positioncmd", "poscmd", "positiondesired", "posdes", "commandedpos", "desiredpos"),
     "time": ("time", "t", "timestamp", "stamp", "times", "timesec", "timeseconds")
     + ("elapsed", "elapsedtime", "timefromstart"),
     "trajectory": ("trajectory", "traj", "run", "episode", "trajectoryid", "episodeindex"),
@@ -125,6 +127,8 @@ def match_names(
             f"{source} has a column of joint {n}, but only {len(names)} columns. Check its name; "
             "rename it, or select the columns with columns={'q': [...]}."
         )
+    if "cmd" not in said_quantities:
+        _leave_incomplete(match, "cmd", n, source)
     if not match.joint_names:
         match.joint_names = list(robot_joints or [str(k + 1) for k in range(n)])
     for target, name in match.columns.items():
@@ -309,6 +313,16 @@ def quantity_of(name: str) -> str | None:
     return _parse(name)[0]
 
 
+def is_signal(name: str) -> bool:
+    """Whether a name is that of a signal without a joint or number.
+
+    >>> is_signal("torques"), is_signal("torque_test"), is_signal("run1")
+    (True, False, False)
+    """
+    quantity, index, joint = _parse(name)
+    return quantity is not None and index is None and joint is None
+
+
 def _plain(text: str) -> str:
     return re.sub(r"[^a-z0-9]", "", text.lower())
 
@@ -318,6 +332,17 @@ def _place_by_index(match: NameMatch, quantity: str, found: Mapping[int, str]) -
     shift = 1 if 0 in found else 0
     for index, name in sorted(found.items()):
         match.columns[f"{quantity}{index + shift}"] = name
+
+
+def _leave_incomplete(match: NameMatch, quantity: str, n: int, source: str) -> None:
+    """Leave columns of an optional quantity under their own names unless all are there."""
+    placed = {name for name in match.columns if re.fullmatch(rf"{quantity}\d+", name)}
+    if placed and n and placed != {f"{quantity}{k + 1}" for k in range(n)}:
+        own = [match.columns.pop(name) for name in sorted(placed)]
+        match.notes.append(
+            f"{source}: column(s) {_listed(own)} are not those of all {n} joints, and are kept "
+            "under their own names"
+        )
 
 
 def _with_joints(

@@ -242,6 +242,27 @@ def read_npz_channels(path: Path, max_bytes: int) -> list[Channel]:
     return [Channel(path.name, table_from_arrays(of_one_length(arrays, str(path))), attributes)]
 
 
+def read_npy_channels(path: Path, max_bytes: int) -> list[Channel]:
+    """Read a NumPy array of columns without names, or with those of a structured array."""
+    check_size(path, path.stat().st_size, max_bytes)
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except ValueError as error:
+        raise LogError(f"{path}: cannot be read as an array of numbers: {error}") from error
+    if array.dtype.names:
+        columns = {name: np.asarray(array[name]) for name in array.dtype.names}
+        return [Channel(path.name, table_from_arrays(of_one_length(columns, str(path))))]
+    if array.ndim not in (1, 2) or array.dtype.kind not in "fiub":
+        raise LogError(
+            f"{path}: holds an array of shape {array.shape} and type {array.dtype}; expected "
+            "numbers with one row per sample."
+        )
+    block = np.array(array.reshape(len(array), -1))
+    return [
+        Channel(path.name, table_from_arrays({str(k): block[:, k] for k in range(block.shape[1])}))
+    ]
+
+
 def of_one_length(arrays: Mapping[str, np.ndarray], source: str) -> dict[str, np.ndarray]:
     """Numeric arrays with one row per sample: those of the most common length.
 

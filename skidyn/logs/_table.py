@@ -88,7 +88,8 @@ def build_table(
     ]
     _refuse_unused_units(tables, options.units or {}, source)
     table = align_channels(tables, [c.name for c in channels], options.resample_rate, match.notes)
-    n = count_joints(table, source)
+    lost = [told for told in match.notes if "without numbers" in told]
+    n = count_joints(table, "; ".join([*lost, source]) if lost else source)
     if options.needs_torque or options.drive_gains is not None:
         table = _torque_from_current(table, n, options.drive_gains, source)
     require_columns(table, n, options.needed, source)

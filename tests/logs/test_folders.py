@@ -131,6 +131,38 @@ def test_listed_joints_that_the_robot_lacks_are_left_aside(tmp_path):
     assert any("belong to no joint of the robot" in note for note in frame.attrs["notes"])
 
 
+@pytest.mark.parametrize("kind", ["csv", "npy"])
+def test_signals_without_headers_and_the_time_in_front(tmp_path, kind):
+    for name, quantity in (("q", "q"), ("qd", "dq"), ("tau", "tau")):
+        block = RUN[["time", f"{quantity}1", f"{quantity}2"]].to_numpy()
+        if kind == "npy":
+            np.save(tmp_path / f"{name}.npy", block)
+        else:
+            np.savetxt(tmp_path / f"{name}.csv", block, delimiter=",")
+    same(read_log(tmp_path, check=False), RUN, ("time", "q1", "dq2", "tau2"))
+
+
+def test_texts_and_parameters_beside_recordings_are_left_out(tmp_path):
+    for k, run in LOG.groupby("trajectory"):
+        # named after what was recorded, not after a signal that the file contains
+        run.drop(columns="trajectory").to_csv(tmp_path / f"torque_test_{k}.csv", index=False)
+    (tmp_path / "README.txt").write_text("A log, of an arm, of an arm.\n")
+    (tmp_path / "gains.csv").write_text("name,value\nkp,3\n")
+    with pytest.warns(UserWarning, match="gains.csv: left out, since no column of it is a signal"):
+        same(read_log(tmp_path, check=False), LOG)
+
+
+@pytest.mark.parametrize("header", [False, True])
+def test_recordings_of_a_folder_whose_columns_are_chosen(tmp_path, header):
+    for k, run in LOG.groupby("trajectory"):
+        run = run[["time", "q1", "q2", "tau1", "tau2"]].set_axis(list("tabcd"), axis=1)
+        run.to_csv(tmp_path / f"run{k}.csv", index=False, header=header)
+    columns = {"q": ["a", "b"], "tau": ["c", "d"]}
+    if not header:
+        columns = {"time": 0, "q": [1, 2], "tau": [3, 4]}
+    same(read_log(tmp_path, columns=columns, check=False), LOG)
+
+
 def test_files_of_differing_length_are_refused(tmp_path):
     RUN[["time", "q1", "q2"]].to_csv(tmp_path / "positions.csv", index=False)
     RUN[["tau1", "tau2"]].iloc[:-5].to_csv(tmp_path / "torques.csv", index=False)
