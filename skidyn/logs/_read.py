@@ -69,8 +69,8 @@ def read_log(
         CSV or text (``.csv .tsv .txt .dat``), Parquet (``.parquet``), Feather, NumPy (``.npz
         .npy``), HDF5 (``.h5 .hdf5``), MATLAB (``.mat``), MCAP (``.mcap``), ROS 1 bag (``.bag``),
         ROS 2 bag (its folder, or ``.db3``); text may be compressed (``.csv.gz``) and hold lists in
-        columns. Several files become several trajectories. A pattern (``"runs/*.csv"``) or a folder means
-        the logs in it; files of a folder with one signal each (``q.csv``, ``tau.csv``,
+        columns. Several files become several trajectories. A pattern (``"runs/*.csv"``) or a folder
+        means the logs in it; files of a folder with one signal each (``q.csv``, ``tau.csv``,
         ``commands.csv``) are one recording. A LeRobot data set is given by its folder.
     robot : Robot, optional
         Its joint names are searched in the column names and determine the order of the columns; the
