@@ -86,7 +86,7 @@ def build_table(
         _in_si(table.assign(time=time), match, source, options)
         for table, time in zip(tables, times, strict=True)
     ]
-    _refuse_unused_units(tables, options.units or {}, source)
+    _refuse_unused_units(tables, options.units or {}, source, match.notes)
     table = align_channels(tables, [c.name for c in channels], options.resample_rate, match.notes)
     lost = [told for told in match.notes if "without numbers" in told]
     n = count_joints(table, "; ".join([*lost, source]) if lost else source)
@@ -155,11 +155,20 @@ def _quantity(name: str) -> str | None:
 
 
 def _refuse_unused_units(
-    tables: Sequence[pd.DataFrame], units: Mapping[str, str], source: str
+    tables: Sequence[pd.DataFrame], units: Mapping[str, str], source: str, notes: list[str]
 ) -> None:
+    """Refuse units of a missing quantity; those of derived velocities follow from the positions."""
     names = {str(name) for table in tables for name in table.columns}
     quantities = {_quantity(name) for name in names}
+    if "q" in units and "cmd" in quantities and "cmd" not in units:
+        notes.append(
+            f"{source}: positions were converted from {units['q']}, commanded positions were not; "
+            f"if these are in {units['q']} too: --units cmd={units['q']} (in Python: "
+            f"units={{'cmd': '{units['q']}'}})"
+        )
     for target in units:
+        if target == "dq" and "dq" not in quantities:
+            continue
         if target not in names and target not in quantities:
             raise LogError(f"units: {source} has no {target}; it has {', '.join(sorted(names))}.")
 
