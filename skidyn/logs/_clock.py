@@ -212,8 +212,11 @@ def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFra
         raise LogError("the log has no two consecutive samples, so it cannot be resampled.")
     alone = f"; {lonely} isolated row(s) left out" if lonely else ""
     how = "averaged" if _slower(1 / rate, time) else "interpolated"
-    notes.append(f"{how} to {rate:g} Hz within {len(parts)} run(s) without a gap{alone}")
     regular: pd.DataFrame = pandas.concat(parts, ignore_index=True)
+    notes.append(
+        f"resample: {how} to {rate:g} Hz within {len(parts)} run(s) without a gap, {len(regular)} "
+        f"rows in place of {len(time)}{alone}"
+    )
     return regular
 
 

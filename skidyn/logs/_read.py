@@ -265,8 +265,8 @@ def _check_mapping(name: str, value: Any, kinds: tuple[type, ...]) -> None:
             raise expected
 
 
-#: Text "k of n" in the notes of remedies.
-_OF = re.compile(r"(\d+) of (\d+)")
+#: Text "k of n", or "k rows in place of n", in the notes of remedies.
+_OF = re.compile(r"(\d+)( of | rows in place of )(\d+)")
 
 
 def _counted(notes: Sequence[str]) -> dict[str, int]:
@@ -282,9 +282,9 @@ def _counted(notes: Sequence[str]) -> dict[str, int]:
     counts: dict[str, int] = {}
     for key, same in alike.items():
         told = [_OF.search(note) for note in same] if "\0" in key else []
-        pairs = [(int(hit[1]), int(hit[2])) for hit in told if hit]
-        if pairs:
-            key = key.replace("\0", "{} of {}".format(*map(sum, zip(*pairs, strict=True))))
+        pairs = [(int(hit[1]), int(hit[3])) for hit in told if hit]
+        if pairs and told[0]:
+            key = key.replace("\0", told[0][2].join(str(sum(n)) for n in zip(*pairs, strict=True)))
         counts[key] = len(same)
     return counts
 

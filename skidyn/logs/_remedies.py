@@ -40,6 +40,8 @@ REMEDIES = (
     "derive:",
     "unwrap:",
     "missing:",
+    "order:",
+    "resample:",
 )
 
 
@@ -223,7 +225,7 @@ def _reorder(
         f"order {numbers}"
         for numbers in map(list, dict.fromkeys(map(tuple, orders.values())))
     ]
-    notes.append(f"order: {', '.join(said)}")
+    notes.append(f"order: {', '.join(said)} in {_all(table)} rows")
 
 
 #: One term of a sum of columns.
@@ -383,6 +385,7 @@ def _unwrapped(table: pd.DataFrame, names: Sequence[str], notes: list[str]) -> p
     parts = find_segments(number, time)
     changed: dict[str, np.ndarray] = {}
     moved = 0
+    others = np.zeros(len(table), dtype=bool)
     for name in names:
         q = table[name].to_numpy(dtype=float).copy()
         for rows in parts:
@@ -395,12 +398,16 @@ def _unwrapped(table: pd.DataFrame, names: Sequence[str], notes: list[str]) -> p
         for rows, turn in zip(parts, turns, strict=True):
             q[rows] -= 2 * np.pi * turn
         moved += int(np.count_nonzero(turns))
+        others |= q != table[name].to_numpy(dtype=float)
         changed[name] = q
     told = ", ".join(changed) or "no position"
     apart = f"; {moved} of {len(changed) * len(parts)} parts were moved by whole turns" * bool(
         moved
     )
-    notes.append(f"unwrap: jumps by a full turn were removed from {told}{apart}")
+    notes.append(
+        f"unwrap: jumps by a full turn were removed from {told} in "
+        f"{int(others.sum())} of {len(table)} rows{apart}"
+    )
     return table.assign(**changed)
 
 

@@ -177,6 +177,8 @@ def test_folders_and_patterns_of_whole_logs(tmp_path):
         frame = read_log(path, check=False)
         assert frame["trajectory"].nunique() == 2
         same(frame, LOG)
+    notes = read_log(tmp_path, resample_rate=50.0, check=False).attrs["notes"]
+    assert any("300 rows in place of 600 (2 of 2 files)" in note for note in notes)
     with pytest.raises(LogError, match="no file matches"):
         read_log(tmp_path / "none*.csv")
     (tmp_path / "empty").mkdir()

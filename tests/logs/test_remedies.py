@@ -45,6 +45,7 @@ def test_factors_are_taken_back(read, spoil, mend):
 def test_order_and_zero_are_taken_back(read):
     swapped = {f"{q}{k}": LOG[f"{q}{3 - k}"] for q in ("q", "dq", "tau") for k in (1, 2)}
     mended = read(LOG.assign(**swapped), order=[2, 1])
+    assert any(note.endswith("[2, 1] in 1200 of 1200 rows") for note in mended.attrs["notes"])
     np.testing.assert_allclose(mended["q2"], LOG["q2"])
     np.testing.assert_allclose(mended["tau1"], LOG["tau1"])
     torques = read(LOG.assign(tau1=LOG["tau2"], tau2=LOG["tau1"]), order={"tau": [2, 1]})
