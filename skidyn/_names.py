@@ -161,6 +161,7 @@ def _said(
 ) -> dict[str, str]:
     """The user's mapping, as log name to source name."""
     said: dict[str, str] = {}
+    joints = None if robot_joints is None else list(robot_joints)
     for target, value in columns.items():
         if re.sub(r"\d+$", "", target) not in SPELLINGS:
             raise LogError(
@@ -168,13 +169,25 @@ def _said(
                 f"{', '.join((*KEYS, *PER_JOINT))}, or one joint of them such as 'q1'."
             )
         if target in PER_JOINT:
-            for k, name in enumerate(_expand(value, names, robot_joints)):
+            if joints is None and isinstance(value, str) and "{joint}" in value:
+                joints = _joints_of(value, names)  # the same order for the other quantities
+            for k, name in enumerate(_expand(value, names, joints)):
                 said[f"{target}{k + 1}"] = _existing(name, names, target, source)
         else:
             if not isinstance(value, (str, int)):
                 raise LogError(f"columns: {target!r} takes one column, not {value!r}.")
             said[target] = _existing(value, names, target, source)
     return said
+
+
+def _joints_of(value: str, names: Sequence[str]) -> list[str]:
+    """Joints in the columns that match a pattern, in the order of the columns."""
+    before, *after = map(re.escape, value.split("{joint}"))
+    pattern = before + "(.+)" + r"\1".join(after)  # the same name at every position
+    found = [hit[1] for name in names if (hit := re.fullmatch(pattern, name))]
+    if not found:
+        raise LogError(f"columns: no column matches {value!r}. There are: {_listed(names)}.")
+    return found
 
 
 def _expand(
@@ -187,14 +200,7 @@ def _expand(
     if not isinstance(value, str):
         return list(value)
     if "{joint}" in value:
-        if robot_joints is not None:
-            return [value.replace("{joint}", joint) for joint in robot_joints]
-        before, *after = map(re.escape, value.split("{joint}"))
-        pattern = before + "(.+)" + r"\1".join(after)  # the same name at every position
-        found = [name for name in names if re.fullmatch(pattern, name)]
-        if not found:
-            raise LogError(f"columns: no column matches {value!r}. There are: {_listed(names)}.")
-        return list(found)
+        return [value.replace("{joint}", joint) for joint in robot_joints or ()]
     value = value.replace("{i}", "{index}")
     if value not in names and any(f"{value}{k}" in names for k in (0, 1)):
         value += "{index}"  # a column of lists, which became one column per joint

@@ -125,7 +125,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
     }
     # defaults are left to read_log, so that a script made from this contains only given options
     always = ("columns", "units", "drive_gains", "rate")
-    unsaid = ([], "recorded", "auto", "error")
+    unsaid: tuple[Any, ...] = ([], "recorded", "auto", "error")
 
     def given(value: Any) -> bool:
         # a zero is given: it is refused, not taken for False

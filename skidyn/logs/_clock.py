@@ -95,7 +95,7 @@ def _clock(table: pd.DataFrame, rate: float | None, source: str) -> tuple[np.nda
     return _since(stamps)
 
 
-def _since(stamps: pd.Series) -> tuple[np.ndarray, Any]:
+def _since(stamps: Any) -> tuple[np.ndarray, Any]:
     """Seconds since the first of some dates or durations, and this first one."""
     import pandas
 

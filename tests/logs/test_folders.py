@@ -229,6 +229,10 @@ def test_patterns_name_columns_without_a_robot(tmp_path):
     RUN[["time", *names]].rename(columns=names).to_csv(tmp_path / "log.csv", index=False)
     columns = {"q": "{joint}_angle_x", "tau": "m{i}_load"}
     same(read_log(tmp_path / "log.csv", columns=columns, check=False), RUN)
+    order = {"q1": "b_angle", "q2": "a_angle", "tau2": "a_load", "tau1": "b_load"}
+    RUN[["time", *order]].rename(columns=order).to_csv(tmp_path / "turned.csv", index=False)
+    columns = {"q": "{joint}_angle", "tau": "{joint}_load"}
+    same(read_log(tmp_path / "turned.csv", columns=columns, check=False), RUN)
     with pytest.raises(LogError, match="no column matches"):
         read_log(tmp_path / "log.csv", columns={"q": "{joint}_none", "tau": "m{i}_load"})
 
