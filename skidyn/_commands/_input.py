@@ -121,6 +121,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         **{name: pairs(name, said.get(name), numbers=True) for name in NUMBERS},
         **{name: said.get(name) for name in AS_GIVEN},
         "derive": listed(said.get("derive")),
+        "gravity": gravity_option(said.get("gravity")),
     }
     # defaults are left to read_log, so that a script made from this contains only given options
     always = ("columns", "units", "drive_gains", "rate")
@@ -218,11 +219,16 @@ def read_robot(options: argparse.Namespace) -> Robot:
     path = Path(options.urdf)
     if not path.is_file():
         raise SkidynError(f"no file {options.urdf}; --urdf must name the description of the robot")
-    gravity = getattr(options, "gravity", None)
-    given: dict[str, Any] = {"joints": covered_joints(options)}
-    if gravity is not None:
-        given["gravity"] = [number("gravity", word) for word in listed(gravity)]
-    return Robot.from_file(path, **given)
+    gravity = gravity_option(getattr(options, "gravity", None))
+    robot = Robot.from_file(path, joints=covered_joints(options))
+    return robot if gravity is None else robot.with_gravity(gravity)
+
+
+def gravity_option(text: str | None) -> Any:
+    """``0,0,9.81`` as numbers; ``none`` as it is."""
+    if text is None or text.strip() == "none":
+        return text and "none"
+    return [number("gravity", word) for word in listed(text)]
 
 
 def embedded_robot(name: str) -> Robot:
