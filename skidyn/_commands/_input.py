@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from skidyn._checks import warn_about_log
 from skidyn._commands._arguments import Input, check_files
 from skidyn._commands._controllers import Setting, read_controller
 from skidyn._commands._output import RECORDED, hashes, working
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from skidyn.identification import RBDRegressor
+    from skidyn.measurement import Suspicion
     from skidyn.robots import Robot
     from skidyn.simulation import Controller
 
@@ -54,6 +56,19 @@ def read_driven(
     effects = effects_option(options.model)
     model = RBDRegressor(robot, effects, "nominal" if options.nominal else "identified")
     return model, frame, tau, controller
+
+
+def find_suspicions(frame: pd.DataFrame, robot: Robot) -> tuple[Suspicion, ...]:
+    """Suspicions about a log, the most influential first; none without torque."""
+    from skidyn.logs import check_log
+
+    if "tau1" not in frame:
+        return ()
+    quality = check_log(frame, robot)
+    for fault in quality.faults:
+        warn_about_log(fault)
+    # wrong bodies of the description are not an error of the log
+    return tuple(check for check in quality.checks if check.check != "bodies")
 
 
 def effects_option(text: str) -> tuple[str, ...]:

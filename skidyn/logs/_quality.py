@@ -171,22 +171,11 @@ class LogQuality:
         return "\n".join([*self._told(), *lines]).rstrip()
 
     def _told(self) -> list[str]:
-        """Warnings, one paragraph each."""
-        lines = [f"! {fault}" for fault in self.faults]
-        for check in self.checks:
-            mark = {"certain": "!!", "suspected": "! ", "noted": "- "}[check.certainty]
-            lines.append(f"{mark} {check.suspicion} ({check.certainty})")
-            lines.append(f"   {check.evidence}")
-            if check.remedy is not None:
-                lines.append(f"   fix it with: {check.remedy.option}{_effect_of(check)}")
+        """Faults and suspicions, one paragraph each."""
+        from skidyn.measurement import paragraphs
+
+        lines = [*(f"! {fault}" for fault in self.faults), *paragraphs(self.checks)]
         return [*lines, ""] if lines else []
-
-
-def _effect_of(check: Suspicion) -> str:
-    """The influence of a remedy in words, if it has one."""
-    if check.influence is None or check.influence < 0.005:
-        return ""
-    return f"  (alone, it removes {100 * check.influence:.0f} % of the error of the robot's model)"
 
 
 def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:

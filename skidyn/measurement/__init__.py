@@ -37,5 +37,5 @@ from skidyn.measurement._servo_settings import (
     ServoSetting as ServoSetting,
     servo_settings as servo_settings,
 )
-from skidyn.measurement._suspicion import CERTAINTIES as CERTAINTIES
+from skidyn.measurement._suspicion import CERTAINTIES as CERTAINTIES, paragraphs as paragraphs
 from skidyn.measurement._torque_delay import measured_delay as measured_delay

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -107,3 +108,28 @@ class Suspicion:
             "remedy": remedy,
             "influence": self.influence,
         }
+
+
+def paragraphs(found: Iterable[Suspicion]) -> list[str]:
+    """Suspicions as lines of text, with evidence and remedies.
+
+    Parameters
+    ----------
+    found : iterable of Suspicion
+        Suspicions.
+
+    Returns
+    -------
+    list of str
+        Two or three lines for each.
+    """
+    lines = []
+    for told in found:
+        mark = {"certain": "!!", "suspected": "! ", "noted": "- "}[told.certainty]
+        lines.append(f"{mark} {told.suspicion} ({told.certainty})")
+        lines.append(f"   {told.evidence}")
+        if told.remedy is not None:
+            share = told.influence or 0.0
+            alone = f"  (alone, it removes {100 * share:.0f} % of the error of the robot's model)"
+            lines.append(f"   fix it with: {told.remedy.option}{alone if share > 0.005 else ''}")
+    return lines

@@ -69,7 +69,7 @@ def test_the_script_gives_the_numbers_of_the_page(write, arm, log, tmp_path, mon
     options = write(log.frame, tmp_path / "log.csv")
     served = {}
 
-    def serve(session, folder, *, port, ready, **words):
+    def serve(session, folder, *, checks, port, ready, **words):
         served["session"], served["words"] = session, words
 
     monkeypatch.setattr(skidyn.explorer, "serve", serve)
