@@ -304,6 +304,7 @@ def read_signals(
     that of an X without time. A ColumnError is raised if a column or the time is missing, a
     LogError if the torque has another shape or a value is not finite.
     """
+    refuse_other_gravity(X, robot)
     names = column_names(X)
     values = np.asarray(X.to_numpy() if hasattr(X, "to_numpy") else X)
     if values.ndim != 2:
@@ -345,3 +346,14 @@ def read_signals(
                 f"{row} ({int(bad.any(1).sum())} such rows); drop or repair them first"
             )
     return signals, torque
+
+
+def refuse_other_gravity(X: Any, robot: Robot) -> None:
+    """Refuse a log that was read with another gravity than that of the robot."""
+    stated = getattr(X, "attrs", {}).get("gravity")
+    if stated is not None and not np.allclose(stated, robot.gravity):
+        own = ", ".join(f"{g:g}" for g in robot.gravity)
+        raise LogError(
+            f"the log was read with gravity {list(stated)} m/s^2, and the robot has [{own}]; give "
+            f"the model robot.with_gravity({list(stated)})"
+        )

@@ -6,7 +6,7 @@ from __future__ import annotations
 import ast
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -61,9 +61,8 @@ def read_again(
     options: dict[str, Any] = {}
     for code in codes:
         name, _, value = code.partition("=")
-        if name == "Robot.from_urdf(..., gravity":
-            gravity = ast.literal_eval(value.rstrip(")") + ")")
-            robot = replace(robot, gravity=np.asarray(gravity, dtype=float))
+        if name == "gravity":
+            robot = robot.with_gravity(ast.literal_eval(value))
         else:
             now = ast.literal_eval(value)
             before = options.get(name)

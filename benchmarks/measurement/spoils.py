@@ -199,7 +199,7 @@ def compensated(stated: bool) -> Spoil:
         names = columns("tau", n)
         changes = dict(zip(names, (log[names].to_numpy() - pull).T, strict=True))
         near = np.abs(pull - robot.gravity_torque(q)).max() < NEAR * np.abs(pull).max()
-        option = "--restore-gravity" if stated else "--" if near else "--gravity=0,0,0"
+        option = "--restore-gravity" if stated else "--" if near else "--gravity none"
         return Spoiled(log.assign(**changes), robot, ("reading",), option)
 
     return spoil

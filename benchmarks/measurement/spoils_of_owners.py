@@ -36,7 +36,7 @@ def weightless(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spo
     pull = robot.gravity_torque(joints_of(log, "q", robot))
     if not felt(log, robot, np.zeros_like(pull)):
         return None
-    return Spoiled(log, claimed, ("reading",), "--gravity=")
+    return Spoiled(log, claimed, ("reading",), "--gravity")
 
 
 def other_velocity(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:

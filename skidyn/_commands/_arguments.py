@@ -143,7 +143,8 @@ def with_remedies(parser: Any) -> None:
     fix.add_argument(
         "--gravity",
         metavar="X,Y,Z",
-        help="gravity in the base frame, m/s^2 (for a robot on a wall)",
+        help="gravity in the base frame, m/s^2 (for a robot on a wall), or none if it was removed "
+        "from the torque",
     )
     fix.add_argument(
         "--flip",

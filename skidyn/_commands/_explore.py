@@ -9,8 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import command, with_controller, with_log
-from skidyn._commands._input import covered_joints, read_driven, reading
-from skidyn._commands._output import working
+from skidyn._commands._input import (
+    covered_joints,
+    find_suspicions,
+    read_driven,
+    read_robot,
+    reading,
+)
+from skidyn._commands._output import print_suspicions, working
 
 DESCRIPTION = """\
 Run the loop by hand on a local page: view the measurement against the model, click where the model
@@ -40,9 +46,13 @@ def run(options: argparse.Namespace) -> None:
 
     from skidyn.explorer import Session, serve
 
-    model, frame, tau, controller = read_driven(options)
+    model, frame, tau, controller = read_driven(options, check=False)
     with working("Preparing", options):
+        checks = find_suspicions(frame, read_robot(options))
         session = Session(model, frame, tau)
+
+    if not options.json:
+        print_suspicions(checks)
 
     def ready(address: str) -> None:
         if options.json:
@@ -62,6 +72,7 @@ def run(options: argparse.Namespace) -> None:
         reading=reading(options),
         # the script computes the torque only if the log has none
         controller=None if "tau1" in frame else controller,
+        checks=checks,
         port=options.port,
         ready=ready,
     )

@@ -7,8 +7,8 @@ import argparse
 from typing import Any
 
 from skidyn._commands._arguments import JsonFile, command, with_controller, with_log
-from skidyn._commands._input import read_driven
-from skidyn._commands._output import parameters, print_json, working
+from skidyn._commands._input import find_suspicions, read_driven, read_robot
+from skidyn._commands._output import parameters, print_json, print_suspicions, working
 from skidyn._writing import write_json
 
 #: Estimators that need only a log.
@@ -62,7 +62,9 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    model, frame, tau, controller = read_driven(options)
+    model, frame, tau, controller = read_driven(options, check=False)
+    with working("Checking", options):
+        checks = find_suspicions(frame, read_robot(options))
     model.set_params(
         consistent=options.consistent, estimator=options.estimator, prior_std=options.prior_std
     )
@@ -73,12 +75,13 @@ def run(options: argparse.Namespace) -> None:
         driven["controller"] = controller
     with working("Identifying", options):
         model.fit(frame, tau, **driven)
-    content = parameters(model)
+    content = {**parameters(model), "checks": [check.to_dict() for check in checks]}
     if options.out:
         write_json(options.out, content)
     if options.json:
         print_json(content)
         return
+    print_suspicions(checks)
     essential = content["essential_parameters"]
     for row in essential["parameters"] if options.essential else content["coefficients"]:
         print(f"{row['value']:12.5g} ± {row['std']:9.2g}   {row['name']}")

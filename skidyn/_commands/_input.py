@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from skidyn._checks import warn_about_log
 from skidyn._commands._arguments import Input, check_files
 from skidyn._commands._controllers import Setting, read_controller
 from skidyn._commands._output import RECORDED, hashes, working
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from skidyn.identification import RBDRegressor
+    from skidyn.measurement import Suspicion
     from skidyn.robots import Robot
     from skidyn.simulation import Controller
 
@@ -54,6 +56,19 @@ def read_driven(
     effects = effects_option(options.model)
     model = RBDRegressor(robot, effects, "nominal" if options.nominal else "identified")
     return model, frame, tau, controller
+
+
+def find_suspicions(frame: pd.DataFrame, robot: Robot) -> tuple[Suspicion, ...]:
+    """Suspicions about a log, the most influential first; none without torque."""
+    from skidyn.logs import check_log
+
+    if "tau1" not in frame:
+        return ()
+    quality = check_log(frame, robot)
+    for fault in quality.faults:
+        warn_about_log(fault)
+    # wrong bodies of the description are not an error of the log
+    return tuple(check for check in quality.checks if check.check != "bodies")
 
 
 def effects_option(text: str) -> tuple[str, ...]:
@@ -122,6 +137,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         **{name: pairs(name, said.get(name), numbers=True) for name in NUMBERS},
         **{name: said.get(name) for name in AS_GIVEN},
         "derive": listed(said.get("derive")),
+        "gravity": gravity_option(said.get("gravity")),
     }
     # defaults are left to read_log, so that a script made from this contains only given options
     always = ("columns", "units", "drive_gains", "rate")
@@ -224,11 +240,16 @@ def read_robot(options: argparse.Namespace) -> Robot:
     path = Path(options.urdf)
     if not path.is_file():
         raise SkidynError(f"no file {options.urdf}; --urdf must name the description of the robot")
-    gravity = getattr(options, "gravity", None)
-    given: dict[str, Any] = {"joints": covered_joints(options)}
-    if gravity is not None:
-        given["gravity"] = [number("gravity", word) for word in listed(gravity)]
-    return Robot.from_file(path, **given)
+    gravity = gravity_option(getattr(options, "gravity", None))
+    robot = Robot.from_file(path, joints=covered_joints(options))
+    return robot if gravity is None else robot.with_gravity(gravity)
+
+
+def gravity_option(text: str | None) -> Any:
+    """``0,0,9.81`` as numbers; ``none`` as it is."""
+    if text is None or text.strip() == "none":
+        return text and "none"
+    return [number("gravity", word) for word in listed(text)]
 
 
 def embedded_robot(name: str) -> Robot:

@@ -135,6 +135,15 @@ def working(text: str, options: argparse.Namespace) -> Iterator[None]:
             yield
 
 
+def print_suspicions(checks: Sequence[Suspicion], where: str = "the log") -> None:
+    """Print suspicions about a log above the result."""
+    from skidyn.measurement import paragraphs
+
+    if checks:
+        print(f"Check {where} first:")
+        print("\n".join(f"  {line}" for line in paragraphs(checks)), end="\n\n")
+
+
 #: Options in a report, with the permitted types, since a report may be untrusted.
 RECORDED: dict[str, tuple[type, ...]] = {
     "logs": (list,),

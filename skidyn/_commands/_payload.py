@@ -6,16 +6,22 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from skidyn._checks import warn_about_log
 from skidyn._commands._arguments import Input, JsonFile, command, with_log_only
-from skidyn._commands._input import effects_option, json_option, read_frame, read_robot
-from skidyn._commands._output import print_json, working
+from skidyn._commands._input import (
+    effects_option,
+    find_suspicions,
+    json_option,
+    read_frame,
+    read_robot,
+)
+from skidyn._commands._output import print_json, print_suspicions, working
 from skidyn._exceptions import SkidynError
 from skidyn._writing import write_json
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from skidyn.measurement import Suspicion
     from skidyn.robots import Robot
 
 DESCRIPTION = """\
@@ -75,9 +81,9 @@ def run(options: argparse.Namespace) -> None:
     gains = options.drive_gains
     if options.known_mass is not None and gains is None:
         options.drive_gains = str([1.0] * robot.n_joints)  # the torques are the currents
-    loaded = _read(options, robot)
+    loaded, doubts = _read(options, robot)
     options.logs = options.unloaded
-    unloaded = _read(options, robot)
+    unloaded, others = _read(options, robot)
     common: dict[str, Any] = {"link": options.link, "effects": effects_option(options.model)}
     if options.com is not None:
         common["com"] = _numbers(options.com)
@@ -88,12 +94,17 @@ def run(options: argparse.Namespace) -> None:
         else:
             common["drive_gains"] = json_option("drive-gains", gains)
             found = estimate_drive_gains(robot, loaded, unloaded, options.known_mass, **common)
+    checks = {"loaded": doubts, "unloaded": others}
+    told = {name: [check.to_dict() for check in own] for name, own in checks.items()}
+    content = {**found.to_dict(), "checks": told}
     if options.out:
-        write_json(options.out, found.to_dict())
+        write_json(options.out, content)
     if options.json:
-        print_json(found.to_dict())
-    else:
-        print(found.text)
+        print_json(content)
+        return
+    print_suspicions(doubts, "the recordings with the payload")
+    print_suspicions(others, "the recordings without it")
+    print(found.text)
 
 
 def _numbers(text: str) -> list[float]:
@@ -107,12 +118,11 @@ def _numbers(text: str) -> list[float]:
     return values
 
 
-def _read(options: argparse.Namespace, robot: Robot) -> pd.DataFrame:
-    """A log, checked with its torques, or without the robot if currents are expected."""
-    from skidyn.logs import check_log
-
-    currents = options.known_mass is not None
-    frame = read_frame(options, robot, check=not currents)
-    for message in check_log(frame).warnings if currents else ():
-        warn_about_log(message)
-    return frame
+def _read(options: argparse.Namespace, robot: Robot) -> tuple[pd.DataFrame, tuple[Suspicion, ...]]:
+    """A log, and suspicions about it; currents have another scale than torques by themselves."""
+    frame = read_frame(options, robot, check=False)
+    with working("Checking", options):
+        found = find_suspicions(frame, robot)
+    if options.known_mass is not None:
+        found = tuple(check for check in found if check.check != "torque_scale")
+    return frame, found

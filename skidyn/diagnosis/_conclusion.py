@@ -421,7 +421,8 @@ def _without(
     known = [t for t in _found_terms(problem, findings) if not _on_samples(t)]
     bare = replace_torque(problem, problem.torque - ripple)
     fit = bare.fit((*problem.terms, *known), sigma=result.fit.noise)
-    return replace(result, findings=findings, fit=fit, ripple=ripple)
+    doubted = (*result.doubted, *(c.term for c in terms if wrong.torque is None))
+    return replace(result, findings=findings, fit=fit, ripple=ripple, doubted=doubted)
 
 
 def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> list[UnknownTorque]:

@@ -79,7 +79,9 @@ def changes(problem: Problem, result: SearchResult) -> dict[str, Change]:
     sigma, target = result.fit.noise, bare.target
     blocks = {term: bare.term_rows(term) for term in result.fit.terms}
     own = dict(result.fit.terms.slices(len(bare.rigid_index)))
-    whole = Tester(bare, list(blocks.values()), sigma, target)
+    # What a withdrawn name explained is still there, and is no change of another effect.
+    doubted = [bare.term_rows(t) for t in result.doubted if t not in blocks]
+    whole = Tester(bare, [*blocks.values(), *doubted], sigma, target)
     torques: dict[str, dict[Term, _Block]] = {}
     for hypothesis in named:
         of_kind = torques.setdefault(hypothesis.kind, {})

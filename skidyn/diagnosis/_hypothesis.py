@@ -98,6 +98,9 @@ class SearchResult:
         Known effects that were not found.
     n_tests : int
         Number of all candidates that were tried.
+    doubted : tuple of Term
+        Effects that were found and then withdrawn. What they explained is still in the log, without
+        a name.
     """
 
     findings: list[Hypothesis]
@@ -105,6 +108,7 @@ class SearchResult:
     ripple: Array
     candidates: list[Candidate] = field(default_factory=list)
     n_tests: int = 1
+    doubted: tuple[Term, ...] = ()
 
 
 def ranked_with(best: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:

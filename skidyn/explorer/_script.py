@@ -31,6 +31,8 @@ def script(
     effects = ", ".join(_source(e) for e in model.effects)
     only = "" if joints is None else f", joints={list(joints)!r}"
     how = "".join(f", {k}={_plain(v)!r}" for k, v in reading.items() if v is not None)
+    gravity = reading.get("gravity")
+    turned = "" if gravity is None else f".with_gravity({_plain(gravity)!r})"
     torque = ['tau = log[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()']
     if controller is not None:
         how += ", needs_torque=False"
@@ -52,7 +54,7 @@ def script(
             else []
         ),
         "",
-        f"robot = Robot.from_file({str(urdf)!r}{only})",
+        f"robot = Robot.from_file({str(urdf)!r}{only}){turned}",
         f"log = read_log({[str(name) for name in logs]!r}, robot=robot{how})",
         *torque,
         f"session = Session(RBDRegressor(robot, [{effects}]{_changed(model)}), log, tau)",

@@ -23,6 +23,7 @@ from skidyn._progress import listening
 from skidyn.effects import get_effect
 from skidyn.explorer._session import Session
 from skidyn.identification import RBDRegressor
+from skidyn.measurement import Suspicion
 from skidyn.simulation import Controller
 
 #: Files that are saved in the folder chosen at the start.
@@ -35,11 +36,15 @@ LONGEST_BODY = 2**16
 class Explorer:
     """Answer requests of the page one at a time; the report is made in a separate thread.
 
-    Results are saved in the folder; the other arguments are those of ``session.script``.
+    Results are saved in the folder; ``checks`` are suspicions about the log, and the other
+    arguments are those of ``session.script``.
     """
 
-    def __init__(self, session: Session, folder: Path, **script: Any) -> None:
+    def __init__(
+        self, session: Session, folder: Path, checks: Sequence[Suspicion] = (), **script: Any
+    ) -> None:
         self.session, self.folder, self.script = session, Path(folder), script
+        self.checks = [check.to_dict() for check in checks]
         self.token = secrets.token_urlsafe(24)
         self._saved: RBDRegressor | None = None
         self._told: dict[str, Any] = {"text": "", "share": None}
@@ -75,6 +80,7 @@ class Explorer:
             "refinable": s.refinable,
             "noise": [float(x) for x in s.noise],
             "worst": s.worst,
+            "checks": self.checks,
         }
 
     def _curves(self, joint: int, trajectory: int) -> dict[str, Any]:
@@ -277,6 +283,7 @@ def serve(
     joints: Sequence[str] | None = None,
     reading: Mapping[str, Any] | None = None,
     controller: Controller | None = None,
+    checks: Sequence[Suspicion] = (),
     port: int = 0,
     ready: Callable[[str], None] = print,
 ) -> None:
@@ -298,6 +305,8 @@ def serve(
         Further arguments with which :func:`skidyn.logs.read_log` read the log, for the script.
     controller : Controller, optional
         Position servos whose torque was computed from their commands, for the script.
+    checks : sequence of Suspicion, default=()
+        Suspicions about the log, which head the page.
     port : int, default=0
         Port; a free one if 0.
     ready : callable, default=print
@@ -315,7 +324,7 @@ def serve(
     """
     uvicorn = import_optional("uvicorn", extra="explore")
     told = {"joints": joints, "reading": reading, "controller": controller}
-    explorer = Explorer(session, Path(folder), logs=logs or ("log.csv",), urdf=urdf, **told)
+    explorer = Explorer(session, Path(folder), checks, logs=logs or ("log.csv",), urdf=urdf, **told)
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     listener.bind((HOST, port))

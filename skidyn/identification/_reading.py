@@ -15,7 +15,7 @@ from skidyn._checks import warn_about_log
 from skidyn._columns import Columns, ColumnSpec, resolve_columns, trajectory_numbers
 from skidyn._exceptions import ColumnError
 from skidyn._order import has_one_motion, order_in_time
-from skidyn._signals import Array, Signals, signals_from
+from skidyn._signals import Array, Signals, refuse_other_gravity, signals_from
 from skidyn.effects import Term
 from skidyn.evidence import broken_notes, smooth_motion
 from skidyn.identification._recordings import Recordings, named_recordings, recognise
@@ -36,6 +36,7 @@ class Reading:
 
     def _begin(self, X: Any, y: Any, first: bool) -> tuple[Signals, Array, NDArray[np.intp]]:
         """Motion and torque of validated data in the order of time, and that order."""
+        given_X = X
         X, y = validate_data(
             self, X, y, reset=first, multi_output=True, y_numeric=True, dtype=np.float64
         )
@@ -44,6 +45,7 @@ class Reading:
             given = self.robot
             self.robot_ = given if isinstance(given, Robot) else Robot.from_urdf(given)
             self.columns_ = self._resolve(X.shape[1])
+        refuse_other_gravity(given_X, self.robot_)
         torque = y.reshape(len(y), -1)
         self._check_targets(torque)
         order = self._order(X)
@@ -105,6 +107,7 @@ class Reading:
     def _motion(self, X: Any) -> tuple[Signals, NDArray[np.intp]]:
         """Motion in the order of time, and the positions of the rows of X in it."""
         check_is_fitted(self)
+        refuse_other_gravity(X, self.robot_)
         X = validate_data(self, X, reset=False, dtype=np.float64)
         order = self._order(X)
         signals = self._read(X[order])

@@ -12,6 +12,7 @@ from skidyn._checks import as_numbers, check_time_order, count_joints, require_c
 from skidyn._exceptions import LogError
 from skidyn._plain import plain
 from skidyn._signals import Signals
+from skidyn.logs._influence import by_influence
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,8 +103,8 @@ class LogQuality:
     joints : tuple of JointQuality
         One per joint.
     checks : tuple of Suspicion
-        Suspicions in the order of their importance, each with its evidence and the option that
-        fixes it.
+        Suspicions, certain ones first, in the order of how much their remedies change the error of
+        the robot's model, if there is a robot; each with its evidence and the option that fixes it.
     faults : tuple of str
         Rows that are not part of this report.
     notes : tuple of str
@@ -170,14 +171,10 @@ class LogQuality:
         return "\n".join([*self._told(), *lines]).rstrip()
 
     def _told(self) -> list[str]:
-        """Warnings, one paragraph each."""
-        lines = [f"! {fault}" for fault in self.faults]
-        for check in self.checks:
-            mark = {"certain": "!!", "suspected": "! ", "noted": "- "}[check.certainty]
-            lines.append(f"{mark} {check.suspicion} ({check.certainty})")
-            lines.append(f"   {check.evidence}")
-            if check.remedy is not None:
-                lines.append(f"   fix it with: {check.remedy.option}")
+        """Faults and suspicions, one paragraph each."""
+        from skidyn.measurement import paragraphs
+
+        lines = [*(f"! {fault}" for fault in self.faults), *paragraphs(self.checks)]
         return [*lines, ""] if lines else []
 
 
@@ -212,12 +209,31 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     >>> quality.n_samples, round(quality.rate), quality.gaps
     (400, 100, 0)
     """
-    from skidyn.measurement import (  # also imports the fits
-        Measurement,
-        check_measurement,
-        count_same_stamps,
-        regular_clock,
+    from skidyn.measurement import check_measurement  # also imports the fits
+
+    measurement, n_trajectories, messages = _measured(frame, robot)
+    checks = check_measurement(measurement)
+    if robot is not None:
+        checks = by_influence(frame, robot, checks, lambda log, own: _measured(log, own)[0])
+    return LogQuality(
+        n_samples=measurement.n_samples,
+        n_trajectories=n_trajectories,
+        duration=float(measurement.steps.sum() - measurement.gaps.sum()),
+        rate=measurement.rate,
+        jitter=measurement.jitter,
+        gaps=len(measurement.gaps),
+        largest_gap=float(measurement.steps.max()),
+        repeated_rows=measurement.repeated,
+        joints=tuple(_joints(measurement)),
+        checks=tuple(checks),
+        faults=tuple(messages),
+        notes=(_SINGLE,) if n_trajectories == 1 else (),
     )
+
+
+def _measured(frame: pd.DataFrame, robot: Robot | None) -> tuple[Measurement, int, list[str]]:
+    """The measurement of a log, its number of trajectories, and sentences about omitted rows."""
+    from skidyn.measurement import Measurement, count_same_stamps, regular_clock
 
     n = count_joints(frame)
     if robot is not None and robot.n_joints != n:
@@ -266,22 +282,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     measurement = Measurement(motion, tau, robot, names, same_stamps=same_stamps)
     if len(measurement.steps) == 0:
         raise LogError("every trajectory of the log has a single row and therefore no motion.")
-    n_trajectories = len(np.unique(trajectory))
-    checks = tuple(check_measurement(measurement))
-    return LogQuality(
-        n_samples=len(time),
-        n_trajectories=n_trajectories,
-        duration=float(measurement.steps.sum() - measurement.gaps.sum()),
-        rate=measurement.rate,
-        jitter=measurement.jitter,
-        gaps=len(measurement.gaps),
-        largest_gap=float(measurement.steps.max()),
-        repeated_rows=measurement.repeated,
-        joints=tuple(_joints(measurement)),
-        checks=checks,
-        faults=tuple(messages),
-        notes=(_SINGLE,) if n_trajectories == 1 else (),
-    )
+    return measurement, len(np.unique(trajectory)), messages
 
 
 def _joints(measurement: Measurement) -> list[JointQuality]:

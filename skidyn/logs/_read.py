@@ -18,7 +18,7 @@ from skidyn.logs._bounds import MAX_BYTES
 from skidyn.logs._folders import find_runs, read_runs
 from skidyn.logs._formats import decode
 from skidyn.logs._quality import check_log
-from skidyn.logs._remedies import REMEDIES, Remedies
+from skidyn.logs._remedies import REMEDIES, Remedies, turn_gravity
 from skidyn.logs._table import ColumnMap, TableOptions, build_table
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def read_log(
     zero: Mapping[str, float] | None = None,
     late: Mapping[str, float | tuple[float, float]] | None = None,
     lowpass: Mapping[str, float] | None = None,
+    gravity: Sequence[float] | Literal["none"] | None = None,
     unwrap: bool = False,
     torque_sign: Literal["recorded", "command"] = "recorded",
     clock: Literal["recorded", "regular"] = "recorded",
@@ -123,6 +124,11 @@ def read_log(
         Time constants of first-order low-pass filters of columns or quantities, which are undone:
         ``{"tau": 0.04}``. Noise added after the filter, such as quantization in the file, is
         amplified by the factor by which the filter reduces noise.
+    gravity : sequence of 3 floats, m/s^2, or "none", optional
+        Gravity in the base frame, for a robot on a wall or on a ceiling; ``"none"`` if it was
+        removed from the torque. The log is checked with it, and it is kept in ``attrs``: a model or
+        a diagnosis of a robot with another gravity refuses the log
+        (:meth:`skidyn.robots.Robot.with_gravity`).
     unwrap : bool, default=False
         Remove jumps by a full turn from positions; recordings are moved by whole turns to be near
         each other.
@@ -158,7 +164,8 @@ def read_log(
         where recorded, ``tau1 .. taun`` (N m or N), ``temp1 .. tempn`` (degrees Celsius) where
         recorded, commanded positions ``cmd1 .. cmdn`` (rad or m) where recorded, then further
         numeric columns under their own names. ``attrs`` holds
-        ``joint_names``, ``files`` (one per trajectory) and ``notes``.
+        ``joint_names``, ``files`` (one per trajectory) and ``notes``, and ``gravity`` (m/s^2) if
+        it was given.
 
     Raises
     ------
@@ -184,6 +191,9 @@ def read_log(
         raise LogError("no file to read: the list of paths is empty.")
     _check_mapping("columns", columns, (str, int))
     _check_mapping("units", units, (str,))
+    said: list[str] = []
+    if gravity is not None:
+        robot = turn_gravity(robot, gravity, said)
     options = TableOptions(
         robot,
         columns,
@@ -236,8 +246,10 @@ def read_log(
         files += [str(file)] * (int(number.max()) + 1)
         tables.append(table)
     frame = pandas.concat(tables, ignore_index=True) if len(tables) > 1 else tables[0]
-    notes = _told_once(notes, len(tables))
+    notes = said + _told_once(notes, len(tables))
     frame.attrs = {"joint_names": joints, "files": files, "notes": notes}
+    if gravity is not None and robot is not None:
+        frame.attrs["gravity"] = robot.gravity.tolist()
     for note in notes:
         warn_about_log(note)
     if check and "tau1" in frame:

@@ -30,6 +30,7 @@ REMEDIES = (
     "gain:",
     "summed:",
     "zero:",
+    "gravity:",
     "clock:",
     "late:",
     "lowpass:",
@@ -111,6 +112,21 @@ def mend_columns(
                 table[column] = table[column] - value
         notes.append(f"zero: {value:g} was subtracted from {name} in {_all(table)} rows")
     return table
+
+
+def turn_gravity(
+    robot: Robot | None, gravity: Sequence[float] | Literal["none"], notes: list[str]
+) -> Robot:
+    """The robot with another gravity; what was done is appended to ``notes``.
+
+    A LogError is raised without a robot, a RobotDescriptionError for an invalid gravity.
+    """
+    if robot is None:
+        raise LogError("gravity is that of a robot; give robot=.")
+    turned = robot.with_gravity(gravity)
+    x, y, z = turned.gravity
+    notes.append(f"gravity: ({x:g}, {y:g}, {z:g}) m/s^2 in the base frame in all checks")
+    return turned
 
 
 def restore_gravity(table: pd.DataFrame, robot: Robot | None, notes: list[str]) -> pd.DataFrame:

@@ -22,6 +22,7 @@ __all__ = [
 from skidyn.measurement._checks import names_in_doubt as names_in_doubt
 from skidyn.measurement._clock import count_same_stamps as count_same_stamps
 from skidyn.measurement._copies import copied_rows as copied_rows
+from skidyn.measurement._influence import errors_of_fits as errors_of_fits
 from skidyn.measurement._lowpass import without_lowpass as without_lowpass
 from skidyn.measurement._measures import (
     find_leaps as find_leaps,
@@ -36,4 +37,5 @@ from skidyn.measurement._servo_settings import (
     ServoSetting as ServoSetting,
     servo_settings as servo_settings,
 )
+from skidyn.measurement._suspicion import CERTAINTIES as CERTAINTIES, paragraphs as paragraphs
 from skidyn.measurement._torque_delay import measured_delay as measured_delay

@@ -55,7 +55,8 @@ KILO = 1e3
 #: ones, from which the stated ones are wrong; least share of the bodies in a torque.
 WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
 #: Error of any bodies, as a share of the spread, and in errors of the mean of a row, from which a
-#: torque is nearly unrelated to the motion.
+#: torque is nearly unrelated to the motion; or of the stated ones, if others predict no part of the
+#: log from the rest of it better than a constant does.
 UNRELATED, BEYOND = 0.67, 4.0
 #: Least share of it that any function of the position must leave, the fewest parts of a log that
 #: are predicted by the others, and the least share of it that can be.
@@ -495,6 +496,8 @@ class UnexplainedTorque(Check):
         least = np.minimum(np.minimum(*seen.errors), carried)  # a load is no other signal
         steady = seen.scatter / np.sqrt(6)  # white noise is not an error of the log
         bad: NDArray[np.bool_] = (least > UNRELATED) & (least > BEYOND * steady)
+        held = _held_out(seen)
+        bad |= (held > 1.0) & (seen.errors[0] > UNRELATED) & (held > BEYOND * steady)
         unlike = [k for k, found in zip(seen.joints, bad, strict=True) if found]
         joints = [k for k in unlike if _left_by_position(seen, k) > LEFT]
         if joints:  # that of another joint may be larger than its own
@@ -504,13 +507,34 @@ class UnexplainedTorque(Check):
         if joints:
             names = ", ".join(measurement.joint(k) for k in joints)
             shares = ", ".join(f"{100 * share:.0f} %" for share in least[bad])
+            others = ", ".join(f"{100 * share:.0f} %" for share in held[bad])
             yield self.suspicion(
                 f"the torque of {names} is nearly unrelated to the motion",
-                f"stated or identified bodies with any friction leave {shares} of its spread; it "
-                "may be another signal, of another joint or another time",
+                f"stated or identified bodies with any friction leave {shares} of its spread, and "
+                f"bodies identified on the other parts of the log {others} of it; it may be "
+                "another signal, of another joint or another time",
                 "suspected",
                 joints,
             )
+
+
+def _held_out(seen: Explained) -> Array:
+    """Errors of parts of a log predicted by bodies identified on the others, as shares of a torque.
+
+    The share is 1 if a constant, the median of the torque, would have the same error.
+    """
+    fits = seen.fits
+    number = fits.signals.trajectory[::SAMPLES]
+    if len(np.unique(number)) < FEWEST_PARTS:
+        number = np.arange(fits.n_rows) * FEWEST_PARTS // fits.n_rows
+    parts = [np.isin(number, own) for own in np.array_split(np.unique(number), FEWEST_PARTS)]
+    left, whole = np.zeros((2, fits.n_joints))
+    for out, predicted in zip(parts, fits.predicted_without(parts), strict=True):
+        for k, (torque, _) in predicted.items():
+            y, use = fits.mean_torque(k)
+            left[k] += np.sum((y[use & out] - torque) ** 2)
+            whole[k] += np.sum((y[use & out] - np.median(y[use])) ** 2)
+    return np.sqrt(left / np.where(whole > 0, whole, np.inf))[seen.joints]
 
 
 def _left_by_position(seen: Explained, k: int) -> float:

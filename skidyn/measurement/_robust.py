@@ -154,7 +154,7 @@ def fit_together(
     residuals = list(targets)
     coefficients = np.zeros(len(size))
     for _ in range(ROUNDS + 2):
-        gram = 1e-9 * np.eye(len(size)) * sum(float(w.sum()) for w in weights)
+        gram = np.zeros((len(size), len(size)))
         cross = np.zeros(len(size))
         for d, corner, place, y, s, w in zip(
             scaled, corners, places, targets, scales, weights, strict=True
@@ -164,6 +164,8 @@ def fit_together(
             gram[corner] += weighted @ weighted.T  # symmetric: half the work
             cross[place] += weighted @ (root * y)
         diagonal = np.sqrt(np.diag(gram))
+        diagonal[diagonal == 0] = 1.0
+        # relative: an absolute one would outweigh the torques of a heavy robot
         gram = gram / diagonal[:, None] / diagonal + 1e-10 * np.eye(len(size))
         coefficients = cho_solve(cho_factor(gram), cross / diagonal) / diagonal
         residuals = [

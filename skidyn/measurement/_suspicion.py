@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import ast
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -28,10 +30,19 @@ class Remedy:
     >>> from skidyn.measurement import Remedy
     >>> str(Remedy("--flip elbow", "flip=['elbow']"))
     "--flip elbow (in Python: flip=['elbow'])"
+    >>> Remedy("--flip elbow", "flip=['elbow']").arguments
+    {'flip': ['elbow']}
     """
 
     option: str
     code: str
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The arguments of ``read_log``; empty if it is not one of them."""
+        call = ast.parse(f"read_log({self.code})", mode="eval").body
+        assert isinstance(call, ast.Call)
+        return {k.arg: ast.literal_eval(k.value) for k in call.keywords if k.arg}
 
     def __str__(self) -> str:
         return f"{self.option} (in Python: {self.code})"
@@ -55,6 +66,9 @@ class Suspicion:
         Joints concerned, counted from 1; empty if it concerns the whole log.
     remedy : Remedy or None
         The option that fixes it; None if there is none.
+    influence : float or None
+        Share of the error of the robot's model, with stated or with identified bodies, that the
+        remedy alone removes; None if it was not determined (:func:`skidyn.logs.check_log`).
 
     Examples
     --------
@@ -69,6 +83,7 @@ class Suspicion:
     certainty: Certainty
     joints: tuple[int, ...] = ()
     remedy: Remedy | None = None
+    influence: float | None = None
 
     def __str__(self) -> str:
         fix = "" if self.remedy is None else f" Fix it with {self.remedy}."
@@ -80,8 +95,8 @@ class Suspicion:
         Returns
         -------
         dict
-            ``check, suspicion, evidence, certainty, joints`` and ``remedy`` (``option`` and
-            ``code``, or None).
+            ``check, suspicion, evidence, certainty, joints``, ``remedy`` (``option`` and ``code``,
+            or None) and ``influence``.
         """
         remedy = self.remedy and {"option": self.remedy.option, "code": self.remedy.code}
         return {
@@ -91,4 +106,30 @@ class Suspicion:
             "certainty": self.certainty,
             "joints": list(self.joints),
             "remedy": remedy,
+            "influence": self.influence,
         }
+
+
+def paragraphs(found: Iterable[Suspicion]) -> list[str]:
+    """Suspicions as lines of text, with evidence and remedies.
+
+    Parameters
+    ----------
+    found : iterable of Suspicion
+        Suspicions.
+
+    Returns
+    -------
+    list of str
+        Two or three lines for each.
+    """
+    lines = []
+    for told in found:
+        mark = {"certain": "!!", "suspected": "! ", "noted": "- "}[told.certainty]
+        lines.append(f"{mark} {told.suspicion} ({told.certainty})")
+        lines.append(f"   {told.evidence}")
+        if told.remedy is not None:
+            share = told.influence or 0.0
+            alone = f"  (alone, it removes {100 * share:.0f} % of the error of the robot's model)"
+            lines.append(f"   fix it with: {told.remedy.option}{alone if share > 0.005 else ''}")
+    return lines

@@ -243,6 +243,7 @@ class Columns(Check):
         else:
             gravity = [round(x, 2) + 0.0 for x in (final.gravity or ())]
             words = ",".join(f"{x:g}" for x in gravity)
+            remedy = (f"--gravity={words}", f"gravity={gravity}")
             if kind == "gravity":
                 what = (
                     f"gravity points along ({words}) in the base frame: the robot is mounted in "
@@ -253,8 +254,8 @@ class Columns(Check):
                 if changes[0].restorable:
                     what += " with the bodies of the description"
                     remedy = ("--restore-gravity", "restore_gravity=True")
-                    return self.suspicion(what, evidence, certainty, joints, remedy)
-            remedy = (f"--gravity={words}", f"Robot.from_urdf(..., gravity={tuple(gravity)})")
+                else:
+                    remedy = ("--gravity none", "gravity='none'")
         return self.suspicion(what, evidence, certainty, joints, remedy)
 
 

@@ -13,7 +13,7 @@ from scipy.stats import t as student_t
 
 from skidyn._columns import column_names, resolve_columns
 from skidyn._exceptions import SkidynError
-from skidyn._signals import Array, Signals, signals_from
+from skidyn._signals import Array, Signals, refuse_other_gravity, signals_from
 from skidyn.effects import Term
 from skidyn.evidence import Problem, make_problem
 from skidyn.identification import from_pseudo_inertia, pseudo_inertia
@@ -188,6 +188,7 @@ def _frames(runs: Any, name: str) -> list[Any]:
 
 
 def _read(robot: Robot, frame: Any) -> tuple[Signals, Array, bool]:
+    refuse_other_gravity(frame, robot)
     names = column_names(frame)
     assert names is not None
     wanted = [f"tau{j + 1}" for j in range(robot.n_joints)]

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -406,6 +406,39 @@ class Robot(RigidBodyDynamics):
             links=assembly.links,
         )
 
+    def with_gravity(self, gravity: Sequence[float] | Literal["none"]) -> Robot:
+        """The same robot with another gravity, as of one that is mounted on a wall.
+
+        Parameters
+        ----------
+        gravity : sequence of 3 floats, m/s^2, or "none"
+            Gravity in the base frame; ``"none"`` for a log of torque from which it was removed.
+
+        Returns
+        -------
+        Robot
+            A copy; this robot is not changed.
+
+        Raises
+        ------
+        RobotDescriptionError
+            It is neither ``"none"`` nor three finite numbers that are not all zero.
+
+        Examples
+        --------
+        >>> from skidyn.datasets import load_planar_arm
+        >>> load_planar_arm().with_gravity([0, -9.81, 0]).gravity
+        array([ 0.  , -9.81,  0.  ])
+        """
+        if isinstance(gravity, str):
+            if gravity != "none":
+                raise _no_gravity(gravity)
+            return replace(self, gravity=_frozen([0.0, 0.0, 0.0]))
+        turned = _gravity(gravity)
+        if not turned.any():
+            raise _no_gravity(gravity)
+        return replace(self, gravity=turned)
+
     @property
     def chain(self) -> Chain:
         """Chain of pytorch-kinematics: batched, differentiable kinematics, float64, on the CPU.
@@ -554,6 +587,13 @@ def _frozen(values: Any) -> np.ndarray:
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array
+
+
+def _no_gravity(gravity: Any) -> RobotDescriptionError:
+    return RobotDescriptionError(
+        f"gravity is {gravity!r}; expected three numbers in m/s^2 that are not all zero, such as "
+        "(0, -9.81, 0), or 'none' for torque from which gravity was removed."
+    )
 
 
 def _gravity(gravity: Sequence[float]) -> np.ndarray:

@@ -90,3 +90,13 @@ def servo_diagnosed(sticky_servo, tmp_path_factory):
     words += ["--out", str(folder / "report.json"), "--html", str(folder / "report.html")]
     assert cli.main(words) == cli.DONE
     return words
+
+
+@pytest.fixture
+def flipped_log(work, tmp_path):
+    """A log in which one torque has the opposite sign, and its robot, as words of a command."""
+    pandas = pytest.importorskip("pandas", reason="needs skidyn[io]")
+    frame = pandas.read_csv(work / "log.csv")
+    frame["tau2"] = -frame["tau2"]
+    frame.to_csv(tmp_path / "flipped.csv", index=False)
+    return [str(tmp_path / "flipped.csv"), "--urdf", str(work / "arm.urdf")]

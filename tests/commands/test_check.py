@@ -122,3 +122,11 @@ def test_a_delay_may_grow_with_the_time(text, flipped, capsys):
 def test_gravity_of_another_length_than_three_is_refused(flipped, capsys):
     assert main(["check", flipped, "--urdf", URDF, "--gravity", "0,1"]) == 2
     assert "gravity" in capsys.readouterr().err
+
+
+def test_gravity_that_was_removed_is_said_in_words(flipped, capsys):
+    assert main(["check", flipped, "--urdf", URDF, "--gravity", "none"]) == 0
+    told = capsys.readouterr()
+    assert "gravity: (0, 0, 0)" in told.out + told.err
+    assert main(["check", flipped, "--urdf", URDF, "--gravity", "0,0,0"]) == 2
+    assert "'none'" in capsys.readouterr().err

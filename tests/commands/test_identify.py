@@ -40,3 +40,13 @@ def test_servos_are_identified_without_torque(servo_diagnosed, run):
 
 def test_without_torque_and_controller_the_log_is_refused(servo_diagnosed, run):
     assert cli.main(["identify", *servo_diagnosed[1:4]]) == 2
+
+
+def test_suspicions_about_the_log_head_the_result(flipped_log, capsys, run):
+    words = ["identify", *flipped_log]
+    assert cli.main(words) == cli.DONE
+    out = capsys.readouterr().out
+    assert out.startswith("Check the log first:")
+    assert out.index("fix it with: --flip tau2") < out.index("condition number")
+    code, content = run(*words)
+    assert code == cli.DONE and content["checks"][0]["remedy"]["option"] == "--flip tau2"

@@ -40,6 +40,7 @@ def test_the_payload(runs, run, tmp_path):
     assert code == cli.DONE and out.exists()
     assert answer["mass"] == pytest.approx(mass, rel=0.05)
     assert "scale alike" in answer["text"]
+    assert answer["checks"] == {"loaded": [], "unloaded": []}
 
 
 def test_drive_gains(runs, run):
@@ -48,6 +49,21 @@ def test_drive_gains(runs, run):
     code, answer = run(*words, "--urdf", folder / "robot.urdf", "--known-mass", mass)
     assert code == cli.DONE
     assert answer["gains"][1] == pytest.approx(10.0, rel=0.05)
+    assert answer["checks"] == {"loaded": [], "unloaded": []}  # currents are as expected
+
+
+def test_a_mistake_in_currents_heads_the_gains(runs, capsys, tmp_path):
+    pandas = pytest.importorskip("pandas", reason="needs skidyn[io]")
+    folder, mass = runs
+    frame = pandas.read_csv(folder / "free_current.csv")
+    frame["i2"] = -frame["i2"]
+    frame.to_csv(tmp_path / "flipped.csv", index=False)
+    words = ["payload", folder / "loaded_current.csv", "--unloaded", tmp_path / "flipped.csv"]
+    words += ["--urdf", folder / "robot.urdf", "--known-mass", mass]
+    assert cli.main([*map(str, words)]) == cli.DONE
+    out = capsys.readouterr().out
+    assert out.startswith("Check the recordings without it first:")
+    assert "fix it with: --flip tau2" in out
 
 
 def test_a_link_that_is_not_there(runs, capsys):

@@ -21,7 +21,7 @@ def changes_of(motion):
     rigid = ROBOT.inverse_dynamics(motion.q, motion.dq, motion.ddq)
     noise = 0.05 * np.random.default_rng(0).normal(size=rigid.shape)
 
-    def of(torque, *found):
+    def of(torque, *found, doubted=()):
         measured = rigid + 0.5 * motion.dq + 2.0 * np.sign(motion.dq) + noise
         measured[:, 1] += torque
         terms = make_terms(["viscous", "coulomb"], 2)
@@ -31,7 +31,8 @@ def changes_of(motion):
             Hypothesis(t.kind, (Candidate(t.kind, t, problem.term_rows(t)),), np.zeros(2), 0.0, 2)
             for t in found
         ]
-        return changes(problem, SearchResult(findings, fit, np.zeros_like(measured)))
+        result = SearchResult(findings, fit, np.zeros_like(measured), doubted=doubted)
+        return changes(problem, result)
 
     return of
 
@@ -60,6 +61,14 @@ def test_a_spring_that_stiffens_changes_with_the_motion(motion, change_of):
 def test_friction_of_its_joint_that_changes_counts(motion, change_of):
     dry = 1.0 * (motion.trajectory >= 4) * np.sign(motion.dq[:, 1])
     assert change_of(3.0 * motion.q[:, 1] + dry) > CHANGE_SHARE
+
+
+def test_what_a_withdrawn_name_explained_is_no_change_of_another_effect(motion, changes_of):
+    q, dq = motion.q[:, 1], motion.dq[:, 1]
+    spring, drag = Term("spring", (2,)), Term("nonlinear_viscous", (2,), {"power": 2.0})
+    torque = 3.0 * q + 2.0 * dq * np.abs(dq)
+    assert changes_of(torque, spring)["spring"].share > CHANGE_SHARE
+    assert changes_of(torque, spring, doubted=(drag,))["spring"].share == 0.0
 
 
 def test_what_another_formula_of_an_effect_leaves_is_less_sure_to_be_a_second_one(

@@ -58,12 +58,18 @@ def no_time(frame, path):
     return ["--rate", str(round(1 / frame["time"].diff().median(), 3)), "--nominal"]
 
 
-@pytest.mark.parametrize("write", [odd_units, no_time])
+def on_a_wall(frame, path):
+    """A robot whose model has other stated bodies and another gravity than its description."""
+    frame.to_csv(path, index=False)
+    return ["--gravity=-9.81,0,0", "--nominal"]
+
+
+@pytest.mark.parametrize("write", [odd_units, no_time, on_a_wall])
 def test_the_script_gives_the_numbers_of_the_page(write, arm, log, tmp_path, monkeypatch, capsys):
     options = write(log.frame, tmp_path / "log.csv")
     served = {}
 
-    def serve(session, folder, *, port, ready, **words):
+    def serve(session, folder, *, checks, port, ready, **words):
         served["session"], served["words"] = session, words
 
     monkeypatch.setattr(skidyn.explorer, "serve", serve)

@@ -23,6 +23,7 @@ from skidyn import load_model
 from skidyn.explorer import Session, serve
 from skidyn.identification import RBDRegressor
 from skidyn.logs import load_recording
+from skidyn.measurement import Remedy, Suspicion
 from skidyn.robots import Robot
 
 pytest.importorskip("starlette", reason="needs skidyn[explore]")
@@ -74,7 +75,8 @@ def served(explorer):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(uvicorn, "Server", Stoppable)
-        words = {"args": (explorer.session, explorer.folder), "kwargs": {"ready": addresses.put}}
+        options = {"ready": addresses.put, "checks": getattr(explorer, "checks", ())}
+        words = {"args": (explorer.session, explorer.folder), "kwargs": options}
         thread = threading.Thread(target=serve, daemon=True, **words)
         thread.start()
         address = urlsplit(addresses.get(timeout=60))
@@ -112,6 +114,14 @@ def test_only_who_has_the_token_gets_an_answer(port, explorer):
     assert ask(port, "/api/state", {}, token)[1]["joints"] == ["joint1", "joint2"]
     # a page of another site whose name leads to this machine sends its own host
     assert ask(port, "/api/state", {}, token, host="evil.example")[0] == 403
+
+
+def test_suspicions_about_the_log_are_told_with_the_state(explorer):
+    remedy = Remedy("--flip elbow", "flip=['elbow']")
+    explorer.checks = (Suspicion("reading", "a sign", "seen", "certain", (2,), remedy),)
+    with served(explorer) as port:
+        status, state = ask(port, "/api/state", {}, explorer.token)
+    assert status == 200 and state["checks"][0]["remedy"]["option"] == "--flip elbow"
 
 
 def test_bad_questions_get_an_error_and_change_nothing(port, explorer):

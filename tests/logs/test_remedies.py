@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
-from skidyn.exceptions import LogError
+from skidyn.exceptions import LogError, SkidynError
+from skidyn.identification import RBDRegressor
 from skidyn.logs import check_log, read_log
 
 ROBOT = load_planar_arm()
@@ -201,11 +202,14 @@ def test_sign_from_the_command(read):
         ({"clock": "even"}, "clock is 'even'"),
         ({"torque_sign": "guess"}, "torque_sign is 'guess'"),
         ({"torque_sign": "command"}, "the log has no cmd1, cmd2"),
+        ({"gravity": [0, 0, 0]}, r"gravity is \[0, 0, 0\]; expected three numbers .* not all zero"),
+        ({"gravity": [0, -9.81]}, "gravity is .*expected three finite numbers"),
+        ({"gravity": "down"}, "gravity is 'down'"),
     ],
 )
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_what_cannot_be_fixed_is_refused_by_name(read, options, words):
-    with pytest.raises(LogError, match=words):
+    with pytest.raises(SkidynError, match=words):
         read(LOG, robot=ROBOT, **options)
 
 
@@ -217,6 +221,22 @@ def test_gravity_that_was_taken_off_is_given_back(read):
     np.testing.assert_allclose(mended[["tau1", "tau2"]], LOG[["tau1", "tau2"]], atol=1e-9)
     with pytest.raises(LogError, match="give robot="):
         read(taken, restore_gravity=True)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize(
+    "gravity, vector", [([0, -9.81, 0], [0.0, -9.81, 0.0]), ("none", [0.0, 0.0, 0.0])]
+)
+def test_a_log_is_read_with_the_gravity_that_its_model_must_have(read, gravity, vector):
+    log = read(LOG, robot=ROBOT, gravity=gravity)
+    assert any(note.startswith("gravity: (") for note in log.attrs["notes"])
+    tau = log[["tau1", "tau2"]].to_numpy()
+    with pytest.raises(LogError, match="give the model robot.with_gravity"):
+        RBDRegressor(ROBOT).fit(log, tau)
+    model = RBDRegressor(ROBOT.with_gravity(gravity)).fit(log, tau)
+    assert model.robot_.gravity.tolist() == vector
+    with pytest.raises(LogError, match="give robot="):
+        read(LOG, gravity=gravity)
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")

@@ -129,3 +129,27 @@ def test_slow_noise_that_a_function_of_the_position_could_follow(recorded, told_
         wave = np.convolve(rng.normal(size=len(own) + 400), np.hanning(200), "same")[200:-200]
         frame.loc[own.index, "tau2"] = wave * frame["tau2"].std() / wave.std()
     assert told_of(frame)["unexplained"].joints == (2,)
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1e3])
+def test_a_robot_of_any_weight_is_checked_alike(arm, recorded, factor):
+    other = replace(arm, inertial_parameters=factor * arm.inertial_parameters)
+    names = [f"tau{k + 1}" for k in range(arm.n_joints)]
+    frame = recorded.frame.assign(q1=recorded.frame["q1"] + 0.5)
+    heavy = frame.assign(**{name: factor * frame[name] for name in names})
+    told, same = check_log(frame, arm).checks, check_log(heavy, other).checks
+    assert [(c.check, c.joints, c.certainty) for c in same] == [
+        (c.check, c.joints, c.certainty) for c in told
+    ]
+
+
+def test_bodies_that_predict_no_other_recording_are_said(arm, told_of):
+    log = make_hidden_effect_log(arm, None, n_trajectories=6, duration=6.0, random_state=8)
+    frame = log.frame.copy()
+    rng = np.random.default_rng(2)
+    # each recording holds the torque of joint 1 of another time of another recording
+    parts = [own for _, own in frame.groupby("trajectory")["tau1"]]
+    mixed = [parts[k].to_numpy()[::-1] for k in rng.permutation(len(parts))]
+    told = told_of(frame.assign(tau1=np.concatenate(mixed)))
+    assert told["unexplained"].joints == (1,)
+    assert "identified on the other parts of the log" in told["unexplained"].evidence

@@ -30,7 +30,7 @@ def test_exchanged_torques(recorded, told_of):
 
 def test_torque_without_gravity(arm, signals, torque, found, only):
     told = found(signals, torque - arm.gravity_torque(signals.q))
-    only(told, "reading", told[0].certainty, "--gravity=0,0,0")
+    only(told, "reading", told[0].certainty, "--gravity none")
 
 
 def test_zero_of_a_joint(signals, torque, found):

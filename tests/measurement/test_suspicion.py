@@ -16,3 +16,8 @@ def test_reports_hold_all_of_it():
     assert Suspicion("gaps", "time has gaps", "seen", "noted").to_dict()["remedy"] is None
     told = Suspicion("reading", "a", "b", "certain", (2,), MENDED).to_dict()
     assert told["joints"] == [2] and told["remedy"]["option"] == "--flip elbow"
+
+
+def test_remedies_are_arguments_of_read_log():
+    assert Remedy("--gain tau2=5", "gain={'tau2': 5.0}").arguments == {"gain": {"tau2": 5.0}}
+    assert Remedy("--controller fit", "Controller(delay=...), fit_servo").arguments == {}

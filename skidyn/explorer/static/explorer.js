@@ -280,11 +280,23 @@
     if (does) { e.preventDefault(); does(); }
   }
 
+  function doubts() {  // suspicions about the log, with the options that fix them
+    const told = state.checks.map((check) => {
+      const line = node("li", undefined, check.certainty);
+      line.append(node("b", `${check.suspicion} (${check.certainty})`), node("span", check.evidence));
+      const alone = check.influence > 0.005 ? ` (alone, it removes ${percent(check.influence)} of the error of the robot's model)` : "";
+      if (check.remedy) line.append("fix it with ", node("code", check.remedy.option), alone);
+      return line;
+    });
+    el("doubts").querySelector("ul").replaceChildren(...told);
+    el("doubts").hidden = !told.length;
+  }
   async function start() {
     state = await ask("state");
     el("joint").replaceChildren(...state.joints.map((name, j) => new Option(`${name} (${j + 1})`, j + 1)));
     el("trajectory").replaceChildren(...state.trajectories.map((k) => new Option(k, k)));
     el("joint").value = state.worst;
+    doubts();
     for (const id of ["joint", "trajectory"]) el(id).addEventListener("change", look);
     el("undo").addEventListener("click", undo);
     el("save").addEventListener("click", save);

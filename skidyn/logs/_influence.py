@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Suspicions in the order of how much their remedies change the answer."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from skidyn._exceptions import LogWarning, SkidynError
+from skidyn.logs._files import Channel
+from skidyn.logs._remedies import Remedies, turn_gravity
+from skidyn.logs._table import TableOptions, build_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from skidyn.measurement import Measurement, Remedy, Suspicion
+    from skidyn.robots import Robot
+
+
+def by_influence(
+    frame: pd.DataFrame,
+    robot: Robot,
+    checks: Sequence[Suspicion],
+    measured: Callable[[pd.DataFrame, Robot], Measurement],
+) -> list[Suspicion]:
+    """Suspicions with the influence of their remedies, in the order of it.
+
+    The influence is the share of the error of the robot's model that a remedy alone removes.
+    Certain suspicions stay before suspected ones, and those without a known influence come last.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        The log, as :func:`skidyn.logs.read_log` returns it.
+    robot : Robot
+        Its robot.
+    checks : sequence of Suspicion
+        Suspicions about the log.
+    measured : callable
+        Makes a measurement of a log and a robot.
+
+    Returns
+    -------
+    list of Suspicion
+        The same suspicions.
+    """
+    from skidyn.measurement import CERTAINTIES, errors_of_fits
+
+    asked = [s.remedy for s in checks if s.certainty != "noted" and s.remedy is not None]
+    before = errors_of_fits(measured(frame, robot)) if asked else None
+    if before is None:
+        return list(checks)
+    found = []
+    for told in checks:
+        after = None
+        if told.remedy in asked:
+            try:
+                after = errors_of_fits(measured(*_mended(frame, robot, told.remedy)))
+            except SkidynError:
+                pass  # a remedy that is possible only with another one has no influence of its own
+        if after is not None:
+            told = replace(told, influence=float(np.max(1 - after / before).clip(0.0, 1.0)))
+        found.append(told)
+    first = {
+        s: -1.0 if s.influence is None or s.certainty == "noted" else s.influence for s in found
+    }
+    return sorted(found, key=lambda s: (CERTAINTIES.index(s.certainty), -first[s]))
+
+
+def _mended(frame: pd.DataFrame, robot: Robot, remedy: Remedy) -> tuple[pd.DataFrame, Robot]:
+    """A log with a remedy, and its robot."""
+    said = dict(remedy.arguments)
+    if "gravity" in said:
+        robot = turn_gravity(robot, said.pop("gravity"), [])
+    own = {f.name for f in fields(Remedies)} & set(said)
+    options = TableOptions(
+        robot=robot,
+        split_gaps=None,
+        remedies=Remedies(**{name: said.pop(name) for name in own}),
+        **said,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        return build_table([Channel("log", frame)], "the log", options)[0], robot
