@@ -44,7 +44,7 @@ def count_joints(frame: pd.DataFrame, source: str = "the log") -> int:
             f"{source} has no joint positions. Recognised names are q1, q_<joint>, position_1 "
             "and similar ones; it has:"
             f" {', '.join(map(str, frame.columns))}. Name them with "
-            "columns={'q': ['first', 'second', ...]}."
+            "--columns 'q=first{i}' (in Python: columns={'q': ['first', 'second', ...]})."
         )
     if numbers != list(range(1, len(numbers) + 1)):
         absent = sorted(set(range(1, numbers[-1] + 1)) - set(numbers))
@@ -130,9 +130,10 @@ def handle_missing(
     frame: pd.DataFrame,
     names: Sequence[str],
     missing: Literal["error", "drop"],
+    notes: list[str],
     source: str = "the log",
 ) -> pd.DataFrame:
-    """Refuse rows with NaN or infinite values, or drop them and report their number.
+    """Refuse rows with NaN or infinite values, or drop them and append their number to ``notes``.
 
     A LogError is raised if such rows are not to be dropped, or no row is left.
     """
@@ -149,12 +150,14 @@ def handle_missing(
     )
     if missing == "error":
         raise LogError(
-            f"{message} Fix them, or pass missing='drop' to leave these rows out; derivatives "
-            "and filters then do not cross the gaps."
+            f"{message} Fix them, or leave these rows out with --missing drop (in Python: "
+            "missing='drop'); derivatives and filters then do not cross the gaps."
         )
     if bad.all():
         raise LogError(f"{message} No row is left.")
-    warn_about_log(f"{message} They are left out.")
+    notes.append(
+        f"missing: {int(bad.sum())} of {len(frame)} rows with NaN or infinite values were left out"
+    )
     kept: pd.DataFrame = frame[~bad].reset_index(drop=True)
     return kept
 

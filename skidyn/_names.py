@@ -35,7 +35,9 @@ SPELLINGS: dict[str, tuple[str, ...]] = {
     + ("observationcurrent",),
     "temp": ("temp", "temperature", "temperatures", "jointtemperature", "motortemperature"),
     "cmd": ("cmd", "command", "commands", "commandedposition", "positioncommand", "qcmd", "qdes")
-    + ("qdesired", "desiredposition", "targetposition", "setpoint", "qref", "action", "control"),
+    + ("qdesired", "desiredposition", "targetposition", "setpoint", "qref", "action", "control")
+    + ("targetq", "qtarget", "goalposition", "goalpos", "referenceposition", "desiredq")
+    + ("positioncmd", "poscmd", "positiondesired", "posdes", "commandedpos", "desiredpos"),
     "time": ("time", "t", "timestamp", "stamp", "times", "timesec", "timeseconds")
     + ("elapsed", "elapsedtime", "timefromstart"),
     "trajectory": ("trajectory", "traj", "run", "episode", "trajectoryid", "episodeindex"),
@@ -74,13 +76,15 @@ def match_names(
     robot_joints: Sequence[str] | None = None,
     columns: Mapping[str, str | int | Sequence[str | int]] | None = None,
     source: str = "the log",
+    listed: Mapping[str, Sequence[str]] | None = None,
 ) -> NameMatch:
     """Assign the unique columns of a source to signals, in the order of the robot's joints.
 
     ``columns`` are the user's, which have priority over any guess: ``{"q1": "pos_a"}``, ``{"q":
     ["pos_a", "pos_b"]}``, ``{"q": "pos_{joint}"}`` or ``{"q": "pos_{i}"}`` (from 0 or 1, as the
-    columns are); a number is the position of a column. A LogError is raised if one is absent, or
-    joints do not match the robot.
+    columns are); a number is the position of a column. ``listed`` are the joints that the source
+    lists beside numbered columns, in their order, by column. A LogError is raised if a column is
+    absent, or joints do not match the robot.
     """
     _refuse_too_many(names, source)
     match = NameMatch()
@@ -101,7 +105,11 @@ def match_names(
         indexed, named = by_index.get(quantity, _Found()), by_joint.get(quantity, _Found())
         if indexed:
             indexed.refuse_choice(quantity, source)
-            _place_by_index(match, quantity, indexed)
+            by_name = _with_joints(indexed, listed or {}, robot_joints, match.notes)
+            if by_name is None:
+                _place_by_index(match, quantity, indexed)
+            else:
+                _place_by_joint(match, quantity, by_name, robot_joints, source)
         elif named and (robot_joints is not None or "q" not in by_index):
             named.refuse_choice(quantity, source)
             _place_by_joint(match, quantity, named, robot_joints, source)
@@ -111,13 +119,16 @@ def match_names(
             f"{source} has {n} joints ({_listed(match.joint_names) or 'by number'}), the robot has "
             f"{len(robot_joints)} ({_listed(robot_joints)}). If the log covers part of the robot, "
             "load it with Robot.from_urdf(..., joints=[...]); if it has further joints, select "
-            "the columns with columns={'q': [...], 'dq': [...], 'tau': [...]}."
+            "the columns with columns={'q': [...], 'dq': [...], 'tau': [...]}. On the command "
+            "line: --joints NAME,..; --columns 'q=...{i},dq=...{i},tau=...{i}'."
         )
     if n > max(len(names), MANY_JOINTS):
         raise LogError(
             f"{source} has a column of joint {n}, but only {len(names)} columns. Check its name; "
             "rename it, or select the columns with columns={'q': [...]}."
         )
+    if "cmd" not in said_quantities:
+        _leave_incomplete(match, "cmd", n, source)
     if not match.joint_names:
         match.joint_names = list(robot_joints or [str(k + 1) for k in range(n)])
     for target, name in match.columns.items():
@@ -150,6 +161,7 @@ def _said(
 ) -> dict[str, str]:
     """The user's mapping, as log name to source name."""
     said: dict[str, str] = {}
+    joints = None if robot_joints is None else list(robot_joints)
     for target, value in columns.items():
         if re.sub(r"\d+$", "", target) not in SPELLINGS:
             raise LogError(
@@ -157,13 +169,25 @@ def _said(
                 f"{', '.join((*KEYS, *PER_JOINT))}, or one joint of them such as 'q1'."
             )
         if target in PER_JOINT:
-            for k, name in enumerate(_expand(value, names, robot_joints)):
+            if joints is None and isinstance(value, str) and "{joint}" in value:
+                joints = _joints_of(value, names)  # the same order for the other quantities
+            for k, name in enumerate(_expand(value, names, joints)):
                 said[f"{target}{k + 1}"] = _existing(name, names, target, source)
         else:
             if not isinstance(value, (str, int)):
                 raise LogError(f"columns: {target!r} takes one column, not {value!r}.")
             said[target] = _existing(value, names, target, source)
     return said
+
+
+def _joints_of(value: str, names: Sequence[str]) -> list[str]:
+    """Joints in the columns that match a pattern, in the order of the columns."""
+    before, *after = map(re.escape, value.split("{joint}"))
+    pattern = before + "(.+)" + r"\1".join(after)  # the same name at every position
+    found = [hit[1] for name in names if (hit := re.fullmatch(pattern, name))]
+    if not found:
+        raise LogError(f"columns: no column matches {value!r}. There are: {_listed(names)}.")
+    return found
 
 
 def _expand(
@@ -176,15 +200,10 @@ def _expand(
     if not isinstance(value, str):
         return list(value)
     if "{joint}" in value:
-        if robot_joints is not None:
-            return [value.replace("{joint}", joint) for joint in robot_joints]
-        before, *after = map(re.escape, value.split("{joint}"))
-        pattern = before + "(.+)" + r"\1".join(after)  # the same name at every position
-        found = [name for name in names if re.fullmatch(pattern, name)]
-        if not found:
-            raise LogError(f"columns: no column matches {value!r}. There are: {_listed(names)}.")
-        return list(found)
+        return [value.replace("{joint}", joint) for joint in robot_joints or ()]
     value = value.replace("{i}", "{index}")
+    if value not in names and any(f"{value}{k}" in names for k in (0, 1)):
+        value += "{index}"  # a column of lists, which became one column per joint
     if "{index}" in value:
         known = set(names)
         first = 0 if value.replace("{index}", "0") in known else 1
@@ -300,6 +319,16 @@ def quantity_of(name: str) -> str | None:
     return _parse(name)[0]
 
 
+def is_signal(name: str) -> bool:
+    """Whether a name is that of a signal without a joint or number.
+
+    >>> is_signal("torques"), is_signal("torque_test"), is_signal("run1")
+    (True, False, False)
+    """
+    quantity, index, joint = _parse(name)
+    return quantity is not None and index is None and joint is None
+
+
 def _plain(text: str) -> str:
     return re.sub(r"[^a-z0-9]", "", text.lower())
 
@@ -309,6 +338,52 @@ def _place_by_index(match: NameMatch, quantity: str, found: Mapping[int, str]) -
     shift = 1 if 0 in found else 0
     for index, name in sorted(found.items()):
         match.columns[f"{quantity}{index + shift}"] = name
+
+
+def _leave_incomplete(match: NameMatch, quantity: str, n: int, source: str) -> None:
+    """Leave columns of an optional quantity under their own names unless all are there."""
+    placed = {name for name in match.columns if re.fullmatch(rf"{quantity}\d+", name)}
+    if placed and n and placed != {f"{quantity}{k + 1}" for k in range(n)}:
+        own = [match.columns.pop(name) for name in sorted(placed)]
+        match.notes.append(
+            f"{source}: column(s) {_listed(own)} are not those of all {n} joints, and are kept "
+            "under their own names"
+        )
+
+
+def _with_joints(
+    found: Mapping[int, str],
+    listed: Mapping[str, Sequence[str]],
+    robot_joints: Sequence[str] | None,
+    notes: list[str],
+) -> dict[str, str] | None:
+    """Numbered columns by the joints that their source lists; None if it lists no names of use.
+
+    Names of which none belongs to a joint of the robot, or some to the joint at their own place,
+    are taken in their order, which is noted.
+    """
+    shift = 1 if 0 in found else 0
+    named: dict[str, str] = {}
+    for index, column in sorted(found.items()):
+        joints = listed.get(column, ())
+        if not 1 <= index + shift <= len(joints):
+            return None
+        named[joints[index + shift - 1]] = column
+    if len(named) < len(found):
+        return None
+    located = [] if robot_joints is None else list(_located(robot_joints, named).values())
+    if robot_joints is None or all(located):
+        return named
+    in_place = [hit is None or hit == name for hit, name in zip(located, named, strict=False)]
+    if len(named) != len(located) or not all(in_place):
+        return named if any(located) else None
+    note = (
+        f"the joints that the log lists ({_listed(named)}) have other names in the description "
+        f"({_listed(robot_joints)}); they are taken in their order"
+    )
+    if note not in notes:
+        notes.append(note)
+    return None
 
 
 def _place_by_joint(
@@ -336,7 +411,8 @@ def _place_by_joint(
             f"{source} has no {quantity} of the joint(s) {_listed(missing)}{hint}; it has "
             f"{_listed(found)}. If the log covers part of the robot, load it with "
             "Robot.from_urdf(..., joints=[...]); if joints have other names, give "
-            f"columns={{'{quantity}': [...]}} in the order of the robot."
+            f"columns={{'{quantity}': [...]}} in the order of the robot (--joints and --columns on "
+            "the command line)."
         )
     match.joint_names = list(robot_joints)
     used = set(located.values())

@@ -41,17 +41,22 @@ _SPELLED = {
     **{"amp": "A", "amps": "A", "ampere": "A", "°c": "C", "celsius": "C", "kelvin": "K"},
 }
 _KNOWN = {unit.lower().replace(" ", ""): unit for units in FACTORS.values() for unit in units}
+#: Names of clocks that end in their unit.
+_CLOCK = re.compile(r"(.*?(?:time|stamp|\bt))[ _](s|secs?|seconds?|ms|us|ns)", re.IGNORECASE)
 _TEMPERATURE_ZERO = {"C": 0.0, "K": 273.15, "F": 32.0}
 
 
 def split_unit(name: str) -> tuple[str, str | None]:
-    """Name of a column without the unit in brackets after it, and that unit.
+    """Name of a column without the unit in brackets after it, or after a time, and that unit.
 
     >>> split_unit("q1 [deg]"), split_unit("Time (ms)"), split_unit("q[1]"), split_unit("q (raw)")
     (('q1', 'deg'), ('Time', 'ms'), ('q[1]', None), ('q (raw)', None))
+    >>> split_unit("timestamp_ns"), split_unit("t_ms"), split_unit("tau_s")
+    (('timestamp', 'ns'), ('t', 'ms'), ('tau_s', None))
     """
     if not name.rstrip().endswith((")", "]")):
-        return name, None
+        clock = _CLOCK.fullmatch(name)
+        return (clock[1], _SPELLED.get(clock[2].lower(), clock[2])) if clock else (name, None)
     hit = re.fullmatch(r"(.*?)[ _]*[\[(]([^\[\]()]*)[\])] *", name)
     if hit is None or not hit[1]:
         return name, None
@@ -82,7 +87,8 @@ def refuse_stated_units(
         example = example or f"column {name!r} states {unit}"
     if wanted:
         raise LogError(
-            f"{source}: {example}; a log is in SI units. To convert it, pass units={wanted}."
+            f"{source}: {example}; a log is in SI units. To convert it, pass units={wanted} "
+            f"(--units {','.join(map('='.join, wanted.items()))} on the command line)."
         )
 
 

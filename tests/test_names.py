@@ -54,6 +54,23 @@ def test_columns_follow_the_order_of_the_robot(match):
     assert all("velocities" in note for note in notes)
 
 
+@pytest.mark.parametrize("name", ["target_q_{}", "goal_position_{}", "position_cmd_{}"])
+def test_commands_of_all_joints_are_a_signal(match, name):
+    names = ["t", "q1", "q2", name.format(0), name.format(1)]
+    columns, _ = match(names)
+    assert [columns["cmd1"], columns["cmd2"]] == names[3:]
+    columns, notes = match(names[:4])
+    assert columns[names[3]] == names[3] and "cmd1" not in columns
+    assert any("are not those of all 2 joints" in note for note in notes)
+
+
+def test_columns_beyond_the_chosen_ones_are_no_signals(match):
+    names = ["time", "q1", "q2", "q3", "tau1", "tau2", "tau3"]
+    columns, _ = match(names, JOINTS, columns={"q": ["q3", "q1"], "tau": ["tau3", "tau1"]})
+    assert (columns["q1"], columns["q2"], columns["tau1"]) == ("q3", "q1", "tau3")
+    assert "q3" not in columns and columns["q2 of the file"] == "q2"
+
+
 def test_names_without_the_word_joint_are_taken_and_told(match):
     columns, notes = match(["time", "q_Elbow", "q_shoulder-pan", "q_gripper"], JOINTS)
     assert (columns["q1"], columns["q2"]) == ("q_shoulder-pan", "q_Elbow")

@@ -48,3 +48,13 @@ def test_units_that_a_header_states_must_be_asked_for(tmp_path):
     with pytest.raises(LogError, match=wanted):
         read_log(tmp_path / "log.csv")
     assert_same(quiet_read(tmp_path / "log.csv", units={"time": "ms", "q": "deg"}))
+
+
+@pytest.mark.parametrize("name", ["time_ms", "t_ms", "Timestamp ms"])
+def test_a_clock_whose_name_ends_in_its_unit(tmp_path, name):
+    rows = [[name, "q1", "tau1"], ["0", "0", "1"], ["10", "1", "1"], ["20", "2", "1"]]
+    (tmp_path / "log.csv").write_text("\n".join(map(",".join, rows)))
+    with pytest.raises(LogError, match=f"'{name}' states ms.*--units time=ms"):
+        read_log(tmp_path / "log.csv", check=False)
+    frame = read_log(tmp_path / "log.csv", units={"time": "ms"}, check=False)
+    np.testing.assert_allclose(frame["time"], [0.0, 0.01, 0.02])

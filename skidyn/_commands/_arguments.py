@@ -128,6 +128,12 @@ def with_reading(parser: Any) -> None:
     )
     parser.add_argument("--joints", help="joints the log covers, separated by commas")
     parser.add_argument("--rate", type=float, help="sampling rate in Hz of a log without time")
+    parser.add_argument(
+        "--topics",
+        metavar="NAMES",
+        help="topics of a bag or groups of an HDF5 file, separated by commas (default: all with "
+        "joint states)",
+    )
     with_remedies(parser)
 
 
@@ -200,6 +206,12 @@ def with_remedies(parser: Any) -> None:
         help="regular: samples were taken at even steps and only the time stamps jitter; recorded: "
         "the stamps are correct; auto (default): the stamps are used, except that a diagnosis "
         "uses even steps if the stamps certainly jitter",
+    )
+    fix.add_argument(
+        "--missing",
+        choices=("error", "drop"),
+        default="error",
+        help="drop: leave out rows with missing or infinite values (default: refuse the log)",
     )
     fix.add_argument(
         "--drop-repeated", action="store_true", help="leave out rows that repeat the one before"

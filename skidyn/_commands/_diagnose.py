@@ -89,7 +89,8 @@ def run(options: argparse.Namespace) -> None:
     for note in answer["noted"]:
         warnings.warn(note, LogWarning, stacklevel=2)
     if options.out:
-        write_json(options.out, {**answer["report"], "provenance": provenance(options)})
+        told = provenance(options, answer["changed"])
+        write_json(options.out, {**answer["report"], "provenance": told})
     if options.html:
         from skidyn.report import write_html
 
@@ -131,7 +132,7 @@ def _answer(options: argparse.Namespace) -> dict[str, Any]:
         if options.html:
             from skidyn.report import summarize
 
-            page = summarize(diagnosis, provenance=provenance(options))
+            page = summarize(diagnosis, provenance=provenance(options, frame.attrs["notes"]))
     return {
         "report": diagnosis.to_dict(),
         "story": diagnosis.story(),
@@ -140,6 +141,7 @@ def _answer(options: argparse.Namespace) -> dict[str, Any]:
         "page": page,
         "told": list(diagnosis.warnings),
         "noted": noted,
+        "changed": frame.attrs["notes"],
         "clock": options.clock,
     }
 

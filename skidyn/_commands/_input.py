@@ -31,7 +31,7 @@ _Read = TypeVar("_Read")
 #: Remedies that are numbers by column, and those that are passed on as they are.
 NUMBERS = ("gain", "zero", "late", "lowpass")
 AS_GIVEN = (
-    "unwrap", "torque_sign", "clock", "drop_repeated", "split_leaps", "restore_gravity",
+    "unwrap", "torque_sign", "clock", "drop_repeated", "split_leaps", "restore_gravity", "missing",
 )  # fmt: skip
 
 
@@ -128,6 +128,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         "units": pairs("units", options.units),
         "drive_gains": json_option("drive-gains", said.get("drive_gains")),
         "rate": options.rate,
+        "topics": listed(said.get("topics")),
         "resample_rate": said.get("resample"),
         "order": order_option(said.get("order")),
         "flip": listed(said.get("flip")),
@@ -140,8 +141,13 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
     }
     # defaults are left to read_log, so that a script made from this contains only given options
     always = ("columns", "units", "drive_gains", "rate")
-    unsaid: tuple[Any, ...] = (None, False, [], "recorded", "auto")
-    return {k: v for k, v in arguments.items() if k in always or v not in unsaid}
+    unsaid: tuple[Any, ...] = ([], "recorded", "auto", "error")
+
+    def given(value: Any) -> bool:
+        # a zero is given: it is refused, not taken for False
+        return value is not None and value is not False and value not in unsaid
+
+    return {k: v for k, v in arguments.items() if k in always or given(v)}
 
 
 def listed(text: str | None) -> list[str]:

@@ -155,7 +155,7 @@ RECORDED: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("gravity", "flip", "order", "combine", "gain"), (str, type(None))),
     "summed": (str, type(None)),
     **dict.fromkeys(("zero", "late", "lowpass", "derive"), (str, type(None))),
-    **dict.fromkeys(("torque_sign", "clock"), (str, type(None))),
+    **dict.fromkeys(("torque_sign", "clock", "missing", "topics"), (str, type(None))),
     **dict.fromkeys(
         ("unwrap", "drop_repeated", "split_leaps", "restore_gravity", "force"), (bool, type(None))
     ),
@@ -164,23 +164,33 @@ RECORDED: dict[str, tuple[type, ...]] = {
 }
 
 
-def provenance(options: argparse.Namespace) -> dict[str, Any]:
+def provenance(options: argparse.Namespace, notes: Sequence[str] = ()) -> dict[str, Any]:
+    """Versions, files and options of a result, and notes on what was changed in the log."""
     from skidyn._version import versions
 
     recorded = {name: getattr(options, name, None) for name in RECORDED}
     digests = hashes([*options.logs, options.urdf])
-    return {"versions": versions(), "sha256": digests, "options": recorded}
+    told = {"versions": versions(), "sha256": digests, "options": recorded}
+    return {**told, "notes": list(notes)} if notes else told
 
 
 def hashes(files: Sequence[str]) -> dict[str, str]:
-    """SHA-256 of every existing file."""
+    """SHA-256 of every existing file, and one for all logs of a folder or a pattern."""
     import hashlib
+
+    from skidyn.logs import files_of
 
     digests = {}
     for name in files:
-        if Path(name).is_file():
-            with open(name, "rb") as file:
-                digests[name] = hashlib.file_digest(file, "sha256").hexdigest()
+        parts = files_of(name)
+        own = []
+        for part in parts:
+            with part.open("rb") as file:
+                own.append(hashlib.file_digest(file, "sha256").hexdigest())
+        if parts == [Path(name)]:
+            digests[name] = own[0]
+        elif own:
+            digests[name] = hashlib.sha256("".join(own).encode()).hexdigest()
     return digests
 
 

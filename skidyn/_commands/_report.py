@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> None:
     model, frame, tau, controller = read_driven(options, check=False)  # a diagnosis checks it
     diagnosis = run_diagnosis(model, frame, tau, options, controller=controller)
     explain_motion(diagnosis, frame, options)
-    write_page(diagnosis, options.html, provenance(options))
+    write_page(diagnosis, options.html, provenance(options, frame.attrs["notes"]))
     page = str(Path(options.html).resolve())
     if options.json:
         print_json({"html": page})

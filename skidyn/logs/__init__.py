@@ -16,3 +16,6 @@ __all__ = [
     "read_log",
     "register_reader",
 ]
+
+# For other packages of skidyn.
+from skidyn.logs._folders import files_of as files_of

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from skidyn._exceptions import LogError
 from skidyn._signals import GAP_STEPS, find_segments
+from skidyn.logs._bounds import MAX_BYTES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,37 +20,68 @@ if TYPE_CHECKING:
 SLOWER = 1.75
 
 
-def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
-    """Clock of a table as float64: its time column, or row number over rate.
+def clocks(
+    tables: Sequence[pd.DataFrame], rate: float | None, sources: Sequence[str]
+) -> list[np.ndarray]:
+    """Clocks of the channels of a file as float64: their time columns, or row number over rate.
 
     ``time`` may hold numbers, in the unit of the source, or dates, which become seconds from the
-    first row, or text of either. ``source`` is the name in the LogError for a clock that is missing
-    or cannot be read, or an invalid rate.
+    first row of the earliest channel, or text of either. ``sources`` are the names in the LogError
+    for a clock that is missing or cannot be read, or an invalid rate.
     """
+    read = [_clock(table, rate, source) for table, source in zip(tables, sources, strict=True)]
+    begins = [begin for _, begin in read if begin is not None]
+    if len(begins) < 2 or len({type(begin) for begin in begins}) > 1:
+        return [since for since, _ in read]
+    return [since if begin is None else since + _apart(begin, min(begins)) for since, begin in read]
+
+
+def _by_position(table: pd.DataFrame) -> str:
+    """How columns of a file without a header are chosen; empty for one with a header."""
+    if not all(str(name).isdigit() for name in table.columns):
+        return ""
+    return (
+        " The file has no header: give the positions of columns, from 0, as in --columns "
+        "time=0,q=1-6,tau=13-18 (in Python: columns={'time': 0, 'q': [1, ...]})."
+    )
+
+
+def _apart(begin: Any, earliest: Any) -> float:
+    """Time from the earliest first stamp to another one."""
+    apart = begin - earliest
+    return float(apart) if isinstance(apart, int) else float(apart.total_seconds())
+
+
+def _clock(table: pd.DataFrame, rate: float | None, source: str) -> tuple[np.ndarray, Any]:
+    """Clock of one table, and the stamp from which it counts; None if it begins at its own zero."""
     import pandas
 
     if "time" not in table.columns:
         if rate is None:
             raise LogError(
-                f"{source} has no time column. Name it with columns={{'time': ...}}, or pass rate= "
-                f"(Hz) if sampling is regular. It has: {', '.join(map(str, table.columns))}."
+                f"{source} has no time column. Name it with --columns time=NAME (in Python: "
+                "columns={'time': NAME}), or give --rate (rate=) in Hz if sampling is regular. It "
+                f"has: {', '.join(map(str, table.columns))}.{_by_position(table)}"
             )
         if not (np.isfinite(rate) and rate > 0):
             raise LogError(f"rate is {rate}; expected a rate in Hz above zero.")
-        return np.arange(len(table)) / rate
+        return np.arange(len(table)) / rate, None
     column = table["time"]
     if column.dtype.kind in "iu" and len(column) and abs(int(column.iloc[0])) > 2**53:
         # nanoseconds since 1970 do not fit a float64 to the nanosecond; differences do
         since: np.ndarray = column.to_numpy() - column.iloc[0]
-        return since.astype(np.float64)
+        return since.astype(np.float64), int(column.iloc[0])
     if column.dtype.kind == "m":
-        since = (column - column.iloc[0]).dt.total_seconds().to_numpy()
-        return np.asarray(since, dtype=np.float64)
+        return _since(column)
     if column.dtype.kind in "fiu":
-        return np.asarray(column, dtype=np.float64)
+        return np.asarray(column, dtype=np.float64), None
     if not _is_date(column):  # pandas converts dates to numbers in its own unit
         try:
-            return np.asarray(pandas.to_numeric(column), dtype=np.float64)
+            return np.asarray(pandas.to_numeric(column), dtype=np.float64), None
+        except (TypeError, ValueError):
+            pass
+        try:  # durations such as 0 days 00:00:01.25
+            return _since(pandas.to_timedelta(column))
         except (TypeError, ValueError):
             pass
     try:
@@ -60,7 +92,16 @@ def seconds(table: pd.DataFrame, rate: float | None, source: str) -> np.ndarray:
         raise LogError(
             f"{source}: the time column holds neither numbers nor dates: {error}"
         ) from None
-    return np.asarray((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=np.float64)
+    return _since(stamps)
+
+
+def _since(stamps: Any) -> tuple[np.ndarray, Any]:
+    """Seconds since the first of some dates or durations, and this first one."""
+    import pandas
+
+    first = stamps.iloc[0] if len(stamps) else None
+    since = np.asarray((stamps - first).dt.total_seconds(), dtype=np.float64)
+    return since, None if pandas.isna(first) else first
 
 
 def _is_date(column: pd.Series) -> bool:
@@ -101,7 +142,8 @@ def align_channels(
         for column in table.columns:
             if column != "time" and owner.setdefault(column, name) != name:
                 raise LogError(
-                    f"{column} is in {owner[column]} and in {name}; choose one with topics=[...]."
+                    f"{column} is in {owner[column]} and in {name}; choose one with "
+                    "topics=[...] (--topics on the command line)."
                 )
         restarts = np.flatnonzero(np.diff(table["time"].to_numpy()) < 0)
         if len(restarts):
@@ -117,6 +159,8 @@ def align_channels(
             for t, name in zip(tables, names, strict=True)
         )
         raise LogError(f"the channels do not overlap in time ({spans}).")
+    if rate is not None:
+        _refuse_too_fast(np.array([begin, end]), rate, sum(len(t.columns) for t in tables))
     base = next((k for k, table in enumerate(tables) if "q1" in table.columns), 0)
     clock = tables[base]["time"].to_numpy() if rate is None else np.arange(begin, end, 1 / rate)
     common = (clock >= begin) & (clock <= end)
@@ -148,6 +192,7 @@ def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFra
     import pandas
 
     time = table["time"].to_numpy()
+    _refuse_too_fast(time, rate, len(table.columns))
     run = np.zeros(len(time), dtype=np.int64)
     run[1:] = np.cumsum(np.diff(time) < 0)
     if "trajectory" in table.columns:
@@ -167,9 +212,23 @@ def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFra
         raise LogError("the log has no two consecutive samples, so it cannot be resampled.")
     alone = f"; {lonely} isolated row(s) left out" if lonely else ""
     how = "averaged" if _slower(1 / rate, time) else "interpolated"
-    notes.append(f"{how} to {rate:g} Hz within {len(parts)} run(s) without a gap{alone}")
     regular: pd.DataFrame = pandas.concat(parts, ignore_index=True)
+    notes.append(
+        f"resample: {how} to {rate:g} Hz within {len(parts)} run(s) without a gap, {len(regular)} "
+        f"rows in place of {len(time)}{alone}"
+    )
     return regular
+
+
+def _refuse_too_fast(time: np.ndarray, rate: float, n_columns: int) -> None:
+    """Refuse a rate at which the log would not fit the bound of a file in memory."""
+    last, first = float(np.max(time, initial=-np.inf)), float(np.min(time, initial=np.inf))
+    rows = max(0.0, last - first) * rate
+    if 8 * rows * n_columns > MAX_BYTES:
+        raise LogError(
+            f"resample_rate is {rate:g} Hz, at which the log would have {rows:.3g} rows; give a "
+            "rate in Hz near the recorded one."
+        )
 
 
 def _in_gap(time: np.ndarray, clock: np.ndarray) -> np.ndarray:

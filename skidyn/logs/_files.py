@@ -195,26 +195,42 @@ def _unpacked(path: Path, most: int) -> int:
 def list_cells(column: Any, name: str, source: str) -> np.ndarray | None:
     """Block (n, joints) of a text column of lists such as ``"[0.1, 0.2]"``, or None.
 
-    A LogError is raised if a cell is not a list or lists differ in length.
+    Empty cells are rows of NaN; lists of words, such as joint names, stay text. A LogError is
+    raised if a cell is not a list or lists differ in length.
     """
-    if column.dtype.kind not in "OUT" or not len(column):
+    if column.dtype.kind not in "OUT":
         return None
-    first = str(column.iloc[0]).strip()
-    if len(first) < 2 or first[0] + first[-1] not in ("[]", "()"):
+    empty = column.isna().to_numpy()
+    if empty.all():
+        return None
+    first = str(column.iloc[int(np.argmin(empty))]).strip()
+    like = _numbers_of(first)
+    if like is None:
         return None
     rows = []
     for k, cell in enumerate(column):
-        text = str(cell).strip()
-        try:
-            if text[:1] + text[-1:] not in ("[]", "()"):
-                raise ValueError
-            rows.append([float(word) for word in text[1:-1].replace(",", " ").split()])
-        except ValueError:
+        row = [np.nan] * len(like) if empty[k] else _numbers_of(str(cell).strip())
+        if row is None:
             raise LogError(
-                f"{source}: {name} holds {text[:40]!r} in row {k}, where a list of numbers such as "
-                f"{first[:40]} is expected."
-            ) from None
+                f"{source}: {name} holds {str(cell).strip()[:40]!r} in row {k}, where a list of "
+                f"numbers such as {first[:40]} is expected."
+            )
+        rows.append(row)
     return stack_rows(rows, name, source)
+
+
+def _numbers_of(text: str) -> list[float] | None:
+    """Numbers of a list such as ``[0.1, 0.2]``, ``(0.1 0.2)`` or ``["0.1"]``; None for other text.
+
+    >>> _numbers_of("[0.1, 2]"), _numbers_of("['elbow']"), _numbers_of("0.1")
+    ([0.1, 2.0], None, None)
+    """
+    if text[:1] + text[-1:] not in ("[]", "()"):
+        return None
+    try:
+        return [float(word.strip("'\"")) for word in text[1:-1].replace(",", " ").split()]
+    except ValueError:
+        return None
 
 
 def read_npz_channels(path: Path, max_bytes: int) -> list[Channel]:
@@ -224,6 +240,27 @@ def read_npz_channels(path: Path, max_bytes: int) -> list[Channel]:
     if "joint_names" in arrays:
         attributes["joint_names"] = [str(name) for name in arrays.pop("joint_names")]
     return [Channel(path.name, table_from_arrays(of_one_length(arrays, str(path))), attributes)]
+
+
+def read_npy_channels(path: Path, max_bytes: int) -> list[Channel]:
+    """Read a NumPy array of columns without names, or with those of a structured array."""
+    check_size(path, path.stat().st_size, max_bytes)
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except ValueError as error:
+        raise LogError(f"{path}: cannot be read as an array of numbers: {error}") from error
+    if array.dtype.names:
+        columns = {name: np.asarray(array[name]) for name in array.dtype.names}
+        return [Channel(path.name, table_from_arrays(of_one_length(columns, str(path))))]
+    if array.ndim not in (1, 2) or array.dtype.kind not in "fiub":
+        raise LogError(
+            f"{path}: holds an array of shape {array.shape} and type {array.dtype}; expected "
+            "numbers with one row per sample."
+        )
+    block = np.array(array.reshape(len(array), -1))
+    return [
+        Channel(path.name, table_from_arrays({str(k): block[:, k] for k in range(block.shape[1])}))
+    ]
 
 
 def of_one_length(arrays: Mapping[str, np.ndarray], source: str) -> dict[str, np.ndarray]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from skidyn._exceptions import LogError
 from skidyn.logs._arrow import read_parquet_channels
 from skidyn.logs._containers import read_hdf5_channels, read_matlab_channels
-from skidyn.logs._files import Channel, read_csv_channels, read_npz_channels
+from skidyn.logs._files import Channel, read_csv_channels, read_npy_channels, read_npz_channels
 from skidyn.logs._ros import read_bag_channels, read_mcap_channels
 
 #: Reader of a file up to an unpacked size, optionally of some channels only.
@@ -30,6 +30,7 @@ _READERS: dict[str, Reader] = {
     **dict.fromkeys(TEXT, _whole(read_csv_channels)),
     **dict.fromkeys((".parquet", ".feather", ".arrow"), _whole(read_parquet_channels)),
     ".npz": _whole(read_npz_channels),
+    ".npy": _whole(read_npy_channels),
     **dict.fromkeys((".h5", ".hdf5"), read_hdf5_channels),
     ".mat": read_matlab_channels,
     ".mcap": read_mcap_channels,

@@ -67,11 +67,11 @@ def read_log(
     Parameters
     ----------
     path : path or sequence of paths
-        CSV or text (``.csv .tsv .txt .dat``), Parquet (``.parquet``), Feather, NumPy (``.npz``),
-        HDF5 (``.h5 .hdf5``), MATLAB (``.mat``), MCAP (``.mcap``), ROS 1 bag (``.bag``), ROS 2 bag
-        (its folder, or ``.db3``); text may be compressed (``.csv.gz``) and hold lists in columns.
-        Several files become several trajectories. A pattern (``"runs/*.csv"``) or a folder means
-        the logs in it; files of a folder with one signal each (``q.csv``, ``tau.csv``,
+        CSV or text (``.csv .tsv .txt .dat``), Parquet (``.parquet``), Feather, NumPy (``.npz
+        .npy``), HDF5 (``.h5 .hdf5``), MATLAB (``.mat``), MCAP (``.mcap``), ROS 1 bag (``.bag``),
+        ROS 2 bag (its folder, or ``.db3``); text may be compressed (``.csv.gz``) and hold lists in
+        columns. Several files become several trajectories. A pattern (``"runs/*.csv"``) or a folder
+        means the logs in it; files of a folder with one signal each (``q.csv``, ``tau.csv``,
         ``commands.csv``) are one recording. A LeRobot data set is given by its folder.
     robot : Robot, optional
         Its joint names are searched in the column names and determine the order of the columns; the
@@ -277,8 +277,8 @@ def _check_mapping(name: str, value: Any, kinds: tuple[type, ...]) -> None:
             raise expected
 
 
-#: Text "k of n" in the notes of remedies.
-_OF = re.compile(r"(\d+) of (\d+)")
+#: Text "k of n", or "k rows in place of n", in the notes of remedies.
+_OF = re.compile(r"(\d+)( of | rows in place of )(\d+)")
 
 
 def _counted(notes: Sequence[str]) -> dict[str, int]:
@@ -294,9 +294,9 @@ def _counted(notes: Sequence[str]) -> dict[str, int]:
     counts: dict[str, int] = {}
     for key, same in alike.items():
         told = [_OF.search(note) for note in same] if "\0" in key else []
-        pairs = [(int(hit[1]), int(hit[2])) for hit in told if hit]
-        if pairs:
-            key = key.replace("\0", "{} of {}".format(*map(sum, zip(*pairs, strict=True))))
+        pairs = [(int(hit[1]), int(hit[3])) for hit in told if hit]
+        if pairs and told[0]:
+            key = key.replace("\0", told[0][2].join(str(sum(n)) for n in zip(*pairs, strict=True)))
         counts[key] = len(same)
     return counts
 

@@ -39,6 +39,10 @@ REMEDIES = (
     "split_leaps:",
     "restore_gravity:",
     "derive:",
+    "unwrap:",
+    "missing:",
+    "order:",
+    "resample:",
 )
 
 
@@ -237,7 +241,7 @@ def _reorder(
         f"order {numbers}"
         for numbers in map(list, dict.fromkeys(map(tuple, orders.values())))
     ]
-    notes.append(f"order: {', '.join(said)}")
+    notes.append(f"order: {', '.join(said)} in {_all(table)} rows")
 
 
 #: One term of a sum of columns.
@@ -368,7 +372,8 @@ def _sign_from_command(table: pd.DataFrame, n: int, notes: list[str]) -> None:
     if absent:
         raise LogError(
             f"torque_sign='command' needs the commanded positions; the log has no "
-            f"{', '.join(absent)}. Name them with columns={{'cmd': [...]}}."
+            f"{', '.join(absent)}. Name them with --columns 'cmd=goal_{{i}}' (in Python: "
+            "columns={'cmd': [...]})."
         )
     turned, signless = 0, 0
     for k in range(1, n + 1):
@@ -396,6 +401,7 @@ def _unwrapped(table: pd.DataFrame, names: Sequence[str], notes: list[str]) -> p
     parts = find_segments(number, time)
     changed: dict[str, np.ndarray] = {}
     moved = 0
+    others = np.zeros(len(table), dtype=bool)
     for name in names:
         q = table[name].to_numpy(dtype=float).copy()
         for rows in parts:
@@ -408,12 +414,16 @@ def _unwrapped(table: pd.DataFrame, names: Sequence[str], notes: list[str]) -> p
         for rows, turn in zip(parts, turns, strict=True):
             q[rows] -= 2 * np.pi * turn
         moved += int(np.count_nonzero(turns))
+        others |= q != table[name].to_numpy(dtype=float)
         changed[name] = q
     told = ", ".join(changed) or "no position"
     apart = f"; {moved} of {len(changed) * len(parts)} parts were moved by whole turns" * bool(
         moved
     )
-    notes.append(f"unwrap: jumps by a full turn were removed from {told}{apart}")
+    notes.append(
+        f"unwrap: jumps by a full turn were removed from {told} in "
+        f"{int(others.sum())} of {len(table)} rows{apart}"
+    )
     return table.assign(**changed)
 
 

@@ -144,8 +144,8 @@ def _wanted(held: Mapping[str, str], topics: Sequence[str] | None, path: Path) -
         asked = "sensor_msgs/JointState" if topics is None else f"topic {', '.join(topics)}"
         kinds = ", ".join(f"{topic} ({kind})" for topic, kind in held.items()) or "nothing"
         raise LogError(
-            f"{path} holds no {asked}. It holds {kinds}. Choose with topics=[...] and name the "
-            "fields of other messages in columns."
+            f"{path} holds no {asked}. It holds {kinds}. Choose with topics=[...] (--topics on "
+            "the command line) and name the fields of other messages in columns."
         )
     return wanted
 

@@ -17,15 +17,14 @@ from skidyn._checks import (
     count_joints,
     handle_missing,
     require_columns,
-    warn_about_log,
 )
 from skidyn._exceptions import LogError
 from skidyn._names import NameMatch, match_names
 from skidyn._units import convert_units, refuse_stated_units
 from skidyn.logs._clock import (
     align_channels,
+    clocks,
     derive_velocity,
-    seconds,
     split_at_restarts,
     split_trajectories,
 )
@@ -78,31 +77,56 @@ def build_table(
         robot_joints=None if options.robot is None else options.robot.joint_names,
         columns=options.columns,
         source=source,
+        listed=_listed_joints(channels),
     )
     refuse_stated_units(match.units, options.units or {}, source)
-    tables = [_renamed(channel, match, source, options) for channel in channels]
-    _refuse_unused_units(tables, options.units or {}, source)
+    tables = [_renamed(channel, match) for channel in channels]
+    times = clocks(tables, options.rate, [f"{source} ({c.name})" for c in channels])
+    tables = [
+        _in_si(table.assign(time=time), match, source, options)
+        for table, time in zip(tables, times, strict=True)
+    ]
+    _refuse_unused_units(tables, options.units or {}, source, match.notes)
     table = align_channels(tables, [c.name for c in channels], options.resample_rate, match.notes)
-    n = count_joints(table, source)
+    lost = [told for told in match.notes if "without numbers" in told]
+    n = count_joints(table, "; ".join([*lost, source]) if lost else source)
     if options.needs_torque or options.drive_gains is not None:
         table = _torque_from_current(table, n, options.drive_gains, source)
     require_columns(table, n, options.needed, source)
     stated = [c.attributes["joint_names"] for c in channels if "joint_names" in c.attributes]
-    if options.robot is None and stated and len(stated[0]) == n:
+    by_number = match.joint_names == [str(k + 1) for k in range(n)]
+    if options.robot is None and by_number and stated and len(stated[0]) == n:
         match.joint_names = list(stated[0])
     table = mend_columns(table, n, match.joint_names, options.remedies, match.notes)
     return _in_order(_clean(table, n, match, source, options), n), match
 
 
-def _renamed(
-    channel: Channel, match: NameMatch, source: str, options: TableOptions
-) -> pd.DataFrame:
-    """The numeric columns of a channel under the names of a log, in SI units."""
+def _listed_joints(channels: Sequence[Channel]) -> dict[str, Sequence[str]]:
+    """Joints that files list for their numbered columns, in their order, by column."""
+    listed: dict[str, Sequence[str]] = {}
+    for channel in channels:
+        if names := channel.attributes.get("joint_names"):
+            listed |= dict.fromkeys(map(str, channel.table.columns), names)
+        listed |= channel.attributes.get("headers", {})
+    return listed
+
+
+def _renamed(channel: Channel, match: NameMatch) -> pd.DataFrame:
+    """The columns of a channel under the names of a log."""
     new_name = {old: new for new, old in match.columns.items()}
     # a column that was not chosen must not have the name of a signal
-    new_name |= {n: f"{n} of the file" for n in match.columns if n not in new_name}
-    table = channel.table.rename(columns=lambda name: new_name.get(str(name), str(name)))
-    table["time"] = seconds(table, options.rate, f"{source} ({channel.name})")
+    new_name |= {
+        str(n): f"{n} of the file"
+        for n in channel.table.columns
+        if str(n) not in new_name and _quantity(str(n)) is not None
+    }
+    return channel.table.rename(columns=lambda name: new_name.get(str(name), str(name)))
+
+
+def _in_si(
+    table: pd.DataFrame, match: NameMatch, source: str, options: TableOptions
+) -> pd.DataFrame:
+    """The numeric columns of a table, in SI units."""
     signals = [name for name in table.columns if _quantity(name) is not None]
     table = as_numbers(table, signals, source)
     kept = [name for name in table.columns if table[name].dtype.kind in "fiub"]
@@ -131,11 +155,20 @@ def _quantity(name: str) -> str | None:
 
 
 def _refuse_unused_units(
-    tables: Sequence[pd.DataFrame], units: Mapping[str, str], source: str
+    tables: Sequence[pd.DataFrame], units: Mapping[str, str], source: str, notes: list[str]
 ) -> None:
+    """Refuse units of a missing quantity; those of derived velocities follow from the positions."""
     names = {str(name) for table in tables for name in table.columns}
     quantities = {_quantity(name) for name in names}
+    if "q" in units and "cmd" in quantities and "cmd" not in units:
+        notes.append(
+            f"{source}: positions were converted from {units['q']}, commanded positions were not; "
+            f"if these are in {units['q']} too: --units cmd={units['q']} (in Python: "
+            f"units={{'cmd': '{units['q']}'}})"
+        )
     for target in units:
+        if target == "dq" and "dq" not in quantities:
+            continue
         if target not in names and target not in quantities:
             raise LogError(f"units: {source} has no {target}; it has {', '.join(sorted(names))}.")
 
@@ -160,7 +193,8 @@ def _torque_from_current(
     if not has_current:
         raise LogError(
             f"drive_gains is given, but {source} has no currents i1..i{n}. If its torque columns "
-            "are currents, say so with columns={'i': [...]}."
+            "are currents, say so with columns={'i': [...]} (--columns 'i=name{i}' on the "
+            "command line)."
         )
     try:
         factors = np.asarray(gains, dtype=float)
@@ -182,7 +216,7 @@ def _clean(
     own_trajectories = "trajectory" in table.columns
     signals = [name for name in table.columns if SIGNAL_COLUMN.fullmatch(name)]
     keys = ["time", "trajectory"] if own_trajectories else ["time"]
-    table = handle_missing(table, [*keys, *signals], options.missing, source)
+    table = handle_missing(table, [*keys, *signals], options.missing, match.notes, source)
     if len(table) < 2:
         raise LogError(f"{source} has {len(table)} row(s); a log needs at least two.")
     time = table["time"].to_numpy()
@@ -213,7 +247,7 @@ def _clean(
     keep = check_time_order(time, number, source)
     if not keep.all() and not _same_stamps(table, n, number, source, options):
         first = int(np.argmin(keep))
-        warn_about_log(
+        match.notes.append(
             f"{source}: {int((~keep).sum())} of {len(keep)} rows repeat the time of the previous "
             f"row (first in row {first}); the first of each is kept."
         )

@@ -38,6 +38,11 @@ def read_description(source: str | bytes | os.PathLike[str]) -> bytes:
         if path.stat().st_size > MAX_BYTES:
             raise RobotDescriptionError(f"{path} has more than {MAX_BYTES} bytes; is it a URDF?")
         data = path.read_bytes()
+        if data.startswith(b"version https://git-lfs"):
+            raise RobotDescriptionError(
+                f"{path} is a Git LFS pointer instead of the file itself. Fetch it with: git lfs "
+                f"pull --include={path.name}"
+            )
     if len(data) > MAX_BYTES:
         raise RobotDescriptionError(f"The description has more than {MAX_BYTES} bytes.")
     if not data.strip():

@@ -60,12 +60,47 @@ def test_the_command_that_fixes_a_log_keeps_its_options(tmp_path, capsys):
         (["--gain", "tau1=0.01*t"], "'0.01*t' is not a number"),
         (["--order", "tau=1"], "is not an order of 2 joints"),
         (["--order", "2,1,tau=2,1"], "'2,1' belongs to no quantity"),
+        (["--resample", "0"], "resample_rate is 0.0; expected a rate in Hz above zero"),
         (["--lowpass", "tau=-1"], "expected a signal and the positive time constant"),
     ],
 )
 def test_an_option_that_cannot_be_met_is_refused(flipped, capsys, option, words):
     assert main(["check", flipped, *option]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_rows_that_are_left_out_are_counted(tmp_path, capsys):
+    holes = LOG.copy()
+    holes.loc[[5, 6], "tau1"] = float("nan")
+    holes.loc[9, "time"] = holes.loc[8, "time"]
+    holes.to_csv(tmp_path / "log.csv", index=False)
+    assert main(["check", str(tmp_path / "log.csv")]) == 2
+    assert "leave these rows out with --missing drop" in capsys.readouterr().err
+    assert main(["check", str(tmp_path / "log.csv"), "--missing", "drop"]) == 0
+    told = capsys.readouterr().out
+    assert f"note: missing: 2 of {len(LOG)} rows with NaN or infinite values were left out" in told
+    assert "1 of 1198 rows repeat the time of the previous row" in told
+
+
+def test_a_file_without_a_header_is_read_by_positions(tmp_path, capsys):
+    path = str(tmp_path / "log.csv")
+    LOG.drop(columns="trajectory").to_csv(path, index=False, header=False)
+    assert main(["check", path]) == 2
+    assert "--columns time=0,q=1-6" in capsys.readouterr().err
+    assert main(["check", path, "--columns", "time=0,q=1-2,dq=3-4,tau=5-6"]) == 0
+
+
+def test_topics_are_chosen_by_name(tmp_path, capsys):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for group in ("left", "right"):
+            for name in LOG:
+                file[f"{group}/{name}"] = LOG[name][:400]
+            file[f"{group}/other_{group}"] = LOG["q1"][:400]
+    words = ["check", str(tmp_path / "log.h5")]
+    assert main(words) == 2
+    assert "--topics" in capsys.readouterr().err
+    assert main([*words, "--topics", "left"]) == 0
 
 
 def test_what_one_check_after_another_found_is_taken_together(flipped, capsys):

@@ -25,6 +25,29 @@ def test_a_log_that_changed_since_the_report_is_reported(diagnosed, tmp_path, ca
     assert "log.csv has changed since" in capsys.readouterr().err
 
 
+def test_a_folder_that_changed_since_the_report_is_reported(tmp_path, monkeypatch, capsys):
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=3, duration=3.0).frame
+    urdf = files("skidyn.datasets").joinpath("robots", "planar_arm.urdf").read_text("utf-8")
+    (tmp_path / "arm.urdf").write_text(urdf, encoding="utf-8")
+    (tmp_path / "runs").mkdir()
+    for k, run in log.groupby("trajectory"):
+        run.assign(tau2=-run["tau2"]).to_csv(tmp_path / "runs" / f"run{k}.csv", index=False)
+    monkeypatch.chdir(tmp_path)
+    words = ["diagnose", "runs/", "--urdf", "arm.urdf", "--flip", "joint2", "--effects", "spring"]
+    assert cli.main([*words, "--out", "r.json", "--html", "r.html"]) == cli.DONE
+    provenance = json.loads((tmp_path / "r.json").read_text("utf-8"))["provenance"]
+    assert set(provenance["sha256"]) == {"runs/", "arm.urdf"}
+    note = f"flip: the sign of tau2 was changed in {len(log)} of {len(log)} rows"
+    assert any(line.startswith(note) for line in provenance["notes"])
+    assert note in (tmp_path / "r.html").read_text("utf-8")
+    words = ["add", "--from", "r.json", "--effect", "spring", "--joints", "1"]
+    assert cli.main(words) == cli.DONE
+    assert "has changed" not in capsys.readouterr().err
+    run.to_csv(tmp_path / "runs" / "run1.csv", index=False)
+    assert cli.main(words) == cli.DONE
+    assert "runs has changed since" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("text", ["not json", "[]", "{}", '{"provenance": 3}'])
 def test_a_file_that_is_no_report_is_refused(tmp_path, capsys, text):
     (tmp_path / "x.json").write_text(text, encoding="utf-8")

@@ -102,6 +102,21 @@ def write(path, arrays):
                 file[name] = array
 
 
+def test_an_array_with_names_and_arrays_that_are_no_table(tmp_path):
+    names = ["time", "q1", "tau1"]
+    table = np.zeros(9, dtype=[(name, float) for name in names])
+    table["time"] = np.arange(9) * 0.01
+    np.save(tmp_path / "log.npy", table)
+    assert len(read_log(tmp_path / "log.npy", check=False)) == 9
+    for content in (np.zeros((3, 3, 3)), np.array(["a", "b"])):
+        np.save(tmp_path / "log.npy", content)
+        with pytest.raises(LogError, match="expected numbers with one row per sample"):
+            read_log(tmp_path / "log.npy")
+    np.save(tmp_path / "log.npy", np.array([{}]), allow_pickle=True)
+    with pytest.raises(LogError, match="cannot be read as an array of numbers"):
+        read_log(tmp_path / "log.npy")
+
+
 def test_pickles_in_npz_are_refused(tmp_path):
     objects = np.array([{"a": 1}, None], dtype=object)
     np.savez(tmp_path / "log.npz", t=np.arange(2), q=objects)

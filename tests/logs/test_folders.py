@@ -41,6 +41,27 @@ def test_columns_that_hold_lists(tmp_path):
     same(read_log(tmp_path / "log.csv", check=False), RUN)
 
 
+def test_lists_of_words_stay_text_and_empty_cells_are_missing_values(tmp_path):
+    table = as_lists(RUN).assign(name=str(["left", "right"]))
+    table.loc[[0, 7], "torques"] = None
+    table["positions"] = [json.dumps([str(x) for x in row]) for row in lists(RUN, "q")]
+    table.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(
+        LogError, match=r"2 of 300 rows hold NaN .*tau1: 2, tau2: 2; first in row 0"
+    ):
+        read_log(tmp_path / "log.csv", check=False)
+    frame = read_log(tmp_path / "log.csv", missing="drop", check=False)
+    same(frame, RUN.drop(index=[0, 7]))
+    assert any("without numbers left out: name" in note for note in frame.attrs["notes"])
+
+
+def test_a_column_of_lists_is_chosen_by_its_name(tmp_path):
+    names = {"timestamp": "clock", "positions": "A", "torques": "B"}
+    as_lists(RUN).rename(columns=names).to_csv(tmp_path / "log.csv", index=False)
+    columns = {"time": "clock", "q": "A", "tau": "B"}
+    same(read_log(tmp_path / "log.csv", columns=columns, check=False), RUN)
+
+
 def test_a_cell_that_is_no_list_is_named(tmp_path):
     table = as_lists(RUN)
     table.loc[7, "torques"] = "stopped"
@@ -71,6 +92,77 @@ def test_one_file_per_signal(tmp_path):
     same(read_log(tmp_path, check=False), RUN, ("time", "q1", "dq2", "tau2"))
 
 
+def test_listed_joints_determine_the_order_of_the_columns(tmp_path):
+    robot = load_planar_arm()
+    turned = RUN.rename(columns={f"{q}{k}": f"{q}{3 - k}" for q in ("q", "tau") for k in (1, 2)})
+    (tmp_path / "lists").mkdir()
+    as_lists(turned).to_csv(tmp_path / "lists" / "state.csv", index=False)
+    names = tmp_path / "lists" / "joint_list.txt"
+    names.write_text("joint2\njoint1\n")
+    same(read_log(tmp_path / "lists", robot=robot, check=False), RUN)
+    names.write_text("elbow\nshoulder\n")
+    frame = read_log(tmp_path / "lists", robot=robot, check=False)
+    same(frame, turned)
+    assert any("other names in the description" in note for note in frame.attrs["notes"])
+    names.write_text("joint2\nelbow\n")  # one name is known, at the place of another joint
+    with pytest.raises(LogError, match=r"no q of the joint\(s\) joint1"):
+        read_log(tmp_path / "lists", robot=robot, check=False)
+    (tmp_path / "header").mkdir()
+    RUN[["time"]].to_csv(tmp_path / "header" / "time.csv", index=False)
+    for name, quantity, joints in (("positions", "q", (1, 2)), ("torques", "tau", (2, 1))):
+        block = RUN[[f"{quantity}{k}" for k in joints]]
+        block.columns = [f"joint{k}" for k in joints]
+        block.to_csv(tmp_path / "header" / f"{name}.csv", index=False)
+    for known in (robot, None):
+        same(read_log(tmp_path / "header", robot=known, check=False), RUN)
+
+
+def test_listed_joints_that_the_robot_lacks_are_left_aside(tmp_path):
+    wide = RUN.assign(q3=0.0, tau3=0.0)
+    np.savez(
+        tmp_path / "log.npz",
+        time=RUN["time"],
+        joint_names=["gripper", "joint1", "joint2"],
+        q=wide[["q3", "q1", "q2"]],
+        tau=wide[["tau3", "tau1", "tau2"]],
+    )
+    frame = read_log(tmp_path / "log.npz", robot=load_planar_arm(), check=False)
+    same(frame, RUN)
+    assert any("belong to no joint of the robot" in note for note in frame.attrs["notes"])
+
+
+@pytest.mark.parametrize("kind", ["csv", "npy"])
+def test_signals_without_headers_and_the_time_in_front(tmp_path, kind):
+    for name, quantity in (("q", "q"), ("qd", "dq"), ("tau", "tau")):
+        block = RUN[["time", f"{quantity}1", f"{quantity}2"]].to_numpy()
+        if kind == "npy":
+            np.save(tmp_path / f"{name}.npy", block)
+        else:
+            np.savetxt(tmp_path / f"{name}.csv", block, delimiter=",")
+    same(read_log(tmp_path, check=False), RUN, ("time", "q1", "dq2", "tau2"))
+
+
+def test_texts_and_parameters_beside_recordings_are_left_out(tmp_path):
+    for k, run in LOG.groupby("trajectory"):
+        # named after what was recorded, not after a signal that the file contains
+        run.drop(columns="trajectory").to_csv(tmp_path / f"torque_test_{k}.csv", index=False)
+    (tmp_path / "README.txt").write_text("A log, of an arm, of an arm.\n")
+    (tmp_path / "gains.csv").write_text("name,value\nkp,3\n")
+    with pytest.warns(UserWarning, match="gains.csv: left out, since no column of it is a signal"):
+        same(read_log(tmp_path, check=False), LOG)
+
+
+@pytest.mark.parametrize("header", [False, True])
+def test_recordings_of_a_folder_whose_columns_are_chosen(tmp_path, header):
+    for k, run in LOG.groupby("trajectory"):
+        run = run[["time", "q1", "q2", "tau1", "tau2"]].set_axis(list("tabcd"), axis=1)
+        run.to_csv(tmp_path / f"run{k}.csv", index=False, header=header)
+    columns = {"q": ["a", "b"], "tau": ["c", "d"]}
+    if not header:
+        columns = {"time": 0, "q": [1, 2], "tau": [3, 4]}
+    same(read_log(tmp_path, columns=columns, check=False), LOG)
+
+
 def test_files_of_differing_length_are_refused(tmp_path):
     RUN[["time", "q1", "q2"]].to_csv(tmp_path / "positions.csv", index=False)
     RUN[["tau1", "tau2"]].iloc[:-5].to_csv(tmp_path / "torques.csv", index=False)
@@ -85,6 +177,8 @@ def test_folders_and_patterns_of_whole_logs(tmp_path):
         frame = read_log(path, check=False)
         assert frame["trajectory"].nunique() == 2
         same(frame, LOG)
+    notes = read_log(tmp_path, resample_rate=50.0, check=False).attrs["notes"]
+    assert any("300 rows in place of 600 (2 of 2 files)" in note for note in notes)
     with pytest.raises(LogError, match="no file matches"):
         read_log(tmp_path / "none*.csv")
     (tmp_path / "empty").mkdir()
@@ -135,6 +229,10 @@ def test_patterns_name_columns_without_a_robot(tmp_path):
     RUN[["time", *names]].rename(columns=names).to_csv(tmp_path / "log.csv", index=False)
     columns = {"q": "{joint}_angle_x", "tau": "m{i}_load"}
     same(read_log(tmp_path / "log.csv", columns=columns, check=False), RUN)
+    order = {"q1": "b_angle", "q2": "a_angle", "tau2": "a_load", "tau1": "b_load"}
+    RUN[["time", *order]].rename(columns=order).to_csv(tmp_path / "turned.csv", index=False)
+    columns = {"q": "{joint}_angle", "tau": "{joint}_load"}
+    same(read_log(tmp_path / "turned.csv", columns=columns, check=False), RUN)
     with pytest.raises(LogError, match="no column matches"):
         read_log(tmp_path / "log.csv", columns={"q": "{joint}_none", "tau": "m{i}_load"})
 

@@ -46,6 +46,7 @@ def test_factors_are_taken_back(read, spoil, mend):
 def test_order_and_zero_are_taken_back(read):
     swapped = {f"{q}{k}": LOG[f"{q}{3 - k}"] for q in ("q", "dq", "tau") for k in (1, 2)}
     mended = read(LOG.assign(**swapped), order=[2, 1])
+    assert any(note.endswith("[2, 1] in 1200 of 1200 rows") for note in mended.attrs["notes"])
     np.testing.assert_allclose(mended["q2"], LOG["q2"])
     np.testing.assert_allclose(mended["tau1"], LOG["tau1"])
     torques = read(LOG.assign(tau1=LOG["tau2"], tau2=LOG["tau1"]), order={"tau": [2, 1]})
@@ -294,6 +295,11 @@ def test_positions_that_hold_those_before_them(read):
 def test_sums_that_cannot_be_taken_apart(read, summed, message):
     with pytest.raises(LogError, match=message):
         read(LOG, summed=summed)
+
+
+def test_a_rate_that_fills_the_memory_is_refused(read):
+    with pytest.raises(LogError, match="resample_rate is 1e\\+12 Hz, at which the log would have"):
+        read(LOG, resample_rate=1e12)
 
 
 @pytest.mark.parametrize("rate", [0.0, -5.0, np.nan, np.inf])

@@ -81,6 +81,16 @@ def test_trajectory_numbers_must_be_whole(saved):
         read_log(saved(LOG.assign(trajectory=LOG["trajectory"] + 0.5)))
 
 
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_units_of_velocities_that_are_derived_are_those_of_the_positions(saved):
+    degrees = LOG.drop(columns=["dq1", "dq2"])
+    degrees[["q1", "q2"]] = np.rad2deg(LOG[["q1", "q2"]])
+    degrees = degrees.assign(cmd1=degrees["q1"], cmd2=degrees["q2"])
+    frame = read_log(saved(degrees), units={"q": "deg", "dq": "deg/s"}, check=False)
+    assert (frame["dq1"] - LOG["dq1"]).abs().median() < 0.01
+    assert any("--units cmd=deg" in note for note in frame.attrs["notes"])
+
+
 def test_unit_of_an_absent_quantity(saved):
     with pytest.raises(LogError, match="has no temp"):
         read_log(saved(LOG), units={"temp": "K"})

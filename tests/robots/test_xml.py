@@ -7,7 +7,7 @@ import os
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from skidyn.exceptions import SkidynError
+from skidyn.exceptions import RobotDescriptionError, SkidynError
 from skidyn.robots import Robot
 
 GOOD_INERTIA = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
@@ -35,6 +35,14 @@ TWO = link("a") + link("b", 1)
 def test_missing_file(tmp_path):
     with pytest.raises(FileNotFoundError):
         Robot.from_urdf(tmp_path / "absent.urdf")
+
+
+@pytest.mark.parametrize("read", [Robot.from_file, Robot.from_sdf, Robot.from_mjcf])
+def test_a_git_lfs_pointer_is_recognised(tmp_path, read):
+    path = tmp_path / "robot.urdf"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 10\n")
+    with pytest.raises(RobotDescriptionError, match="git lfs pull --include=robot.urdf"):
+        read(path)
 
 
 def test_path_text_and_bytes_are_read_alike(tmp_path):
