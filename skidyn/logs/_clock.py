@@ -199,8 +199,12 @@ def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFra
         number = table["trajectory"].to_numpy()
         run[1:] += np.cumsum(number[1:] != number[:-1])
     parts, lonely = [], 0
+    gaps: list[tuple[float, float]] = []  # length and beginning, s
     for rows in find_segments(run, time):
         part = table.iloc[rows]
+        if rows.start and run[rows.start] == run[rows.start - 1]:
+            before = time[rows.start - 1]
+            gaps.append((float(time[rows.start] - before), float(before)))
         first, last = time[rows][0], time[rows][-1]
         if not last > first:
             lonely += len(part)
@@ -211,6 +215,12 @@ def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFra
     if not parts:
         raise LogError("the log has no two consecutive samples, so it cannot be resampled.")
     alone = f"; {lonely} isolated row(s) left out" if lonely else ""
+    if gaps:
+        longest, begin = max(gaps)
+        alone += (
+            f"; {len(gaps)} gap(s) in time, the longest of {longest:.3g} s from {begin:.6g} s on, "
+            "cannot be resampled and remain"
+        )
     how = "averaged" if _slower(1 / rate, time) else "interpolated"
     regular: pd.DataFrame = pandas.concat(parts, ignore_index=True)
     notes.append(

@@ -100,7 +100,11 @@ def test_resampling_does_not_fill_a_gap(read):
     log, notes = read(pd.DataFrame({"time": t, "q1": t}), resample_rate=20.0)
     np.testing.assert_allclose(log["q1"], log["time"])
     assert not ((log["time"] > 0.991) & (log["time"] < 2.99)).any()
-    assert any(note.endswith("1 isolated row(s) left out") for note in notes)
+    (note,) = [note for note in notes if note.startswith("resample:")]
+    assert "1 isolated row(s) left out" in note
+    assert note.endswith(
+        "2 gap(s) in time, the longest of 5.01 s from 3.99 s on, cannot be resampled and remain"
+    )
 
 
 def test_a_slower_clock_averages_vibration_away(read):
