@@ -9,13 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import command, with_controller, with_log
-from skidyn._commands._input import (
-    covered_joints,
-    find_suspicions,
-    read_driven,
-    read_robot,
-    reading,
-)
+from skidyn._commands._input import covered_joints, read_checked, reading
 from skidyn._commands._output import print_suspicions, working
 
 DESCRIPTION = """\
@@ -46,9 +40,8 @@ def run(options: argparse.Namespace) -> None:
 
     from skidyn.explorer import Session, serve
 
-    model, frame, tau, controller = read_driven(options, check=False)
+    model, frame, tau, controller, checks = read_checked(options)
     with working("Preparing", options):
-        checks = find_suspicions(frame, read_robot(options))
         session = Session(model, frame, tau)
 
     if not options.json:

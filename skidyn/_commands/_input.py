@@ -46,10 +46,26 @@ def read_driven(
     options: argparse.Namespace, *, check: bool = True
 ) -> tuple[RBDRegressor, pd.DataFrame, Any, Controller | None]:
     """The same with the controller of the options, which may determine the torques."""
+    return _driven(options, read_robot(options), check)
+
+
+def read_checked(
+    options: argparse.Namespace,
+) -> tuple[RBDRegressor, pd.DataFrame, Any, Controller | None, tuple[Suspicion, ...]]:
+    """The same with suspicions about the log, which head the result instead of being warnings."""
+    robot = read_robot(options)
+    model, frame, tau, controller = _driven(options, robot, check=False)
+    with working("Checking", options):
+        return model, frame, tau, controller, find_suspicions(frame, robot)
+
+
+def _driven(
+    options: argparse.Namespace, robot: Robot, check: bool
+) -> tuple[RBDRegressor, pd.DataFrame, Any, Controller | None]:
+    """Model, log, torques and controller of the options for a robot."""
     from skidyn._persistence import load_model
     from skidyn.identification import RBDRegressor
 
-    robot = read_robot(options)
     frame, tau, controller = _log(options, robot, check)
     if options.model.endswith(".skops"):
         return load_model(options.model), frame, tau, controller
@@ -247,9 +263,9 @@ def read_robot(options: argparse.Namespace) -> Robot:
 
 def gravity_option(text: str | None) -> Any:
     """``0,0,9.81`` as numbers; ``none`` as it is."""
-    if text is None or text.strip() == "none":
-        return text and "none"
-    return [number("gravity", word) for word in listed(text)]
+    if text is None:
+        return None
+    return "none" if text.strip() == "none" else [number("gravity", w) for w in listed(text)]
 
 
 def embedded_robot(name: str) -> Robot:
