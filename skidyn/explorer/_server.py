@@ -44,7 +44,7 @@ class Explorer:
         self, session: Session, folder: Path, checks: Sequence[Suspicion] = (), **script: Any
     ) -> None:
         self.session, self.folder, self.script = session, Path(folder), script
-        self.checks = [check.to_dict() for check in checks]
+        self.checks = [{**check.to_dict(), "benefit": check.benefit} for check in checks]
         self.token = secrets.token_urlsafe(24)
         self._saved: RBDRegressor | None = None
         self._told: dict[str, Any] = {"text": "", "share": None}

@@ -85,6 +85,13 @@ class Suspicion:
     remedy: Remedy | None = None
     influence: float | None = None
 
+    @property
+    def benefit(self) -> str:
+        """The influence of the remedy in words; empty if it is below half a per cent."""
+        if self.influence is None or self.influence < 0.005:
+            return ""
+        return f"alone, it removes {100 * self.influence:.0f} % of the error of the robot's model"
+
     def __str__(self) -> str:
         fix = "" if self.remedy is None else f" Fix it with {self.remedy}."
         return f"{self.suspicion}: {self.evidence}.{fix}"
@@ -129,7 +136,6 @@ def paragraphs(found: Iterable[Suspicion]) -> list[str]:
         lines.append(f"{mark} {told.suspicion} ({told.certainty})")
         lines.append(f"   {told.evidence}")
         if told.remedy is not None:
-            share = told.influence or 0.0
-            alone = f"  (alone, it removes {100 * share:.0f} % of the error of the robot's model)"
-            lines.append(f"   fix it with: {told.remedy.option}{alone if share > 0.005 else ''}")
+            benefit = f"  ({told.benefit})" if told.benefit else ""
+            lines.append(f"   fix it with: {told.remedy.option}{benefit}")
     return lines

@@ -284,8 +284,8 @@
     const told = state.checks.map((check) => {
       const line = node("li", undefined, check.certainty);
       line.append(node("b", `${check.suspicion} (${check.certainty})`), node("span", check.evidence));
-      const alone = check.influence > 0.005 ? ` (alone, it removes ${percent(check.influence)} of the error of the robot's model)` : "";
-      if (check.remedy) line.append("fix it with ", node("code", check.remedy.option), alone);
+      const benefit = check.benefit ? ` (${check.benefit})` : "";
+      if (check.remedy) line.append("fix it with ", node("code", check.remedy.option), benefit);
       return line;
     });
     el("doubts").querySelector("ul").replaceChildren(...told);
