@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import ast
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from skidyn.logs import check_log, read_log
-from skidyn.measurement import Suspicion
+from skidyn.measurement import Remedy, Suspicion
 from skidyn.robots import Robot
 
 #: How often a log is read again, and the least share of its rows that a remedy may leave.
@@ -59,12 +58,11 @@ def read_again(
 ) -> tuple[pd.DataFrame, Robot]:
     """A log and its robot, with remedies."""
     options: dict[str, Any] = {}
-    for code in codes:
-        name, _, value = code.partition("=")
+    asked = [item for code in codes for item in Remedy("", code).arguments.items()]
+    for name, now in asked:
         if name == "gravity":
-            robot = robot.with_gravity(ast.literal_eval(value))
+            robot = robot.with_gravity(now)
         else:
-            now = ast.literal_eval(value)
             before = options.get(name)
             if isinstance(now, dict) and before:
                 now = {**before, **now}

@@ -51,25 +51,27 @@ def by_influence(
     """
     from skidyn.measurement import CERTAINTIES, errors_of_fits
 
-    asked = [s.remedy for s in checks if s.certainty != "noted" and s.remedy is not None]
-    before = errors_of_fits(measured(frame, robot)) if asked else None
+    remedies = [None if told.certainty == "noted" else told.remedy for told in checks]
+    before = errors_of_fits(measured(frame, robot)) if any(remedies) else None
     if before is None:
         return list(checks)
     found = []
-    for told in checks:
+    for told, remedy in zip(checks, remedies, strict=True):
         after = None
-        if told.remedy in asked:
+        if remedy is not None:
             try:
-                after = errors_of_fits(measured(*_mended(frame, robot, told.remedy)))
+                after = errors_of_fits(measured(*_mended(frame, robot, remedy)))
             except SkidynError:
                 pass  # a remedy that is possible only with another one has no influence of its own
         if after is not None:
             told = replace(told, influence=float(np.max(1 - after / before).clip(0.0, 1.0)))
         found.append(told)
-    first = {
-        s: -1.0 if s.influence is None or s.certainty == "noted" else s.influence for s in found
-    }
-    return sorted(found, key=lambda s: (CERTAINTIES.index(s.certainty), -first[s]))
+
+    def place(told: Suspicion) -> tuple[int, float]:
+        known = told.influence
+        return CERTAINTIES.index(told.certainty), 1.0 if known is None else -known
+
+    return sorted(found, key=place)
 
 
 def _mended(frame: pd.DataFrame, robot: Robot, remedy: Remedy) -> tuple[pd.DataFrame, Robot]:

@@ -492,6 +492,8 @@ class UnexplainedTorque(Check):
         seen = explained(measurement)
         if seen is None or measurement.stale or measurement.frictionless:
             return  # rough derivatives, or another friction, are no other signal
+        if not np.any(seen.errors[0] > UNRELATED):
+            return
         carried = seen.fits.loaded().identified(Reading()).scale[seen.joints] / seen.spread
         least = np.minimum(np.minimum(*seen.errors), carried)  # a load is no other signal
         steady = seen.scatter / np.sqrt(6)  # white noise is not an error of the log
