@@ -36,7 +36,7 @@ class Reading:
 
     def _begin(self, X: Any, y: Any, first: bool) -> tuple[Signals, Array, NDArray[np.intp]]:
         """Motion and torque of validated data in the order of time, and that order."""
-        given_X = X
+        table = X
         X, y = validate_data(
             self, X, y, reset=first, multi_output=True, y_numeric=True, dtype=np.float64
         )
@@ -45,7 +45,7 @@ class Reading:
             given = self.robot
             self.robot_ = given if isinstance(given, Robot) else Robot.from_urdf(given)
             self.columns_ = self._resolve(X.shape[1])
-        refuse_other_gravity(given_X, self.robot_)
+        refuse_other_gravity(table, self.robot_)
         torque = y.reshape(len(y), -1)
         self._check_targets(torque)
         order = self._order(X)

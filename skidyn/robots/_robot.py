@@ -430,13 +430,13 @@ class Robot(RigidBodyDynamics):
         >>> load_planar_arm().with_gravity([0, -9.81, 0]).gravity
         array([ 0.  , -9.81,  0.  ])
         """
-        if isinstance(gravity, str):
-            if gravity != "none":
-                raise _no_gravity(gravity)
-            return replace(self, gravity=_frozen([0.0, 0.0, 0.0]))
-        turned = _gravity(gravity)
-        if not turned.any():
-            raise _no_gravity(gravity)
+        none = isinstance(gravity, str) and gravity == "none"
+        turned = _frozen(np.zeros(3)) if isinstance(gravity, str) else _gravity(gravity)
+        if not (none or turned.any()):
+            raise RobotDescriptionError(
+                f"gravity is {gravity!r}; expected three numbers in m/s^2 that are not all zero, "
+                "such as (0, -9.81, 0), or 'none' for torque from which gravity was removed."
+            )
         return replace(self, gravity=turned)
 
     @property
@@ -587,13 +587,6 @@ def _frozen(values: Any) -> np.ndarray:
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array
-
-
-def _no_gravity(gravity: Any) -> RobotDescriptionError:
-    return RobotDescriptionError(
-        f"gravity is {gravity!r}; expected three numbers in m/s^2 that are not all zero, such as "
-        "(0, -9.81, 0), or 'none' for torque from which gravity was removed."
-    )
 
 
 def _gravity(gravity: Sequence[float]) -> np.ndarray:
