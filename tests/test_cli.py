@@ -69,7 +69,7 @@ def test_every_command_teaches_with_an_example(capsys):
 
 
 @pytest.mark.parametrize("how", ["python -m skidyn", "skidyn"])
-@pytest.mark.parametrize("module", ["skidyn.cli", "argparse", "numpy", "skidyn.identification"])
+@pytest.mark.parametrize("module", ["skidyn.cli", "argparse", "numpy", "skidyn.robots"])
 def test_ctrl_c_while_modules_are_imported_is_one_line(module, how):
     with open(Path(skidyn.__file__).parents[1] / "pyproject.toml", "rb") as file:
         home, _, name = tomllib.load(file)["project"]["scripts"]["skidyn"].partition(":")
