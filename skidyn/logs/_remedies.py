@@ -168,7 +168,7 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
         from skidyn.measurement import regular_clock
 
         time = table["time"].to_numpy()
-        even = regular_clock(time, table["trajectory"].to_numpy())
+        even = regular_clock(time, table["trajectory"].to_numpy(), table[names].to_numpy(float))
         table = table.assign(time=even)
         notes.append(
             f"clock: {int(np.sum(np.abs(even - time) > 1e-9))} of {len(time)} stamps were moved to "

@@ -32,6 +32,8 @@ EXPLAINED = 0.5
 USUAL = (0.4, 2.5)
 #: Multiples that are attributed to wrong masses unless the other joints contradict.
 CLEARLY = (0.62, 1.6)
+#: Multiple below which little of the torque of the bodies is left, as after a model was subtracted.
+SUBTRACTED = 0.3
 #: Multiples of an effort limit, and of the torque of the bodies, that only another unit reaches.
 FAR = 20.0
 #: Multiple of its effort limit that a joint cannot reach, beside one whose torque is in another
@@ -204,8 +206,9 @@ class TorqueScale(Check):
                 sorted(gains),
             )
             return
+        little = ", or the torque of a model was subtracted" * (typical < SUBTRACTED)
         yield self.suspicion(
-            "torques look like motor currents, motor torques or another unit",
+            f"torques look like motor currents, motor torques or another unit{little}",
             f"they follow the rigid-body torque at a different scale ({told}). The gains below "
             "assume the bodies of the description; if known, use the torques per ampere of the "
             "drives instead (--drive-gains with i columns)",

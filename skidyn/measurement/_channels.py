@@ -113,8 +113,8 @@ class ConstantTorque(Check):
                     [k],
                 )
                 continue
-            if len(measurement.leaps):
-                continue  # parts between jumps have no separate numbers
+            if len(measurement.leaps) or measurement.lost:
+                continue  # a torque may well be constant in a short part between jumps
             still = [
                 int(run) for run in runs if len(runs) > 1 and np.ptp(torque[number == run]) == 0
             ]

@@ -6,6 +6,7 @@ from __future__ import annotations
 from skidyn._exceptions import MisreadLogError
 from skidyn.measurement._acceleration import Acceleration
 from skidyn.measurement._around_zero import DeadBand, TaredTorque
+from skidyn.measurement._arrival import FalseGaps
 from skidyn.measurement._axes import Axes
 from skidyn.measurement._bodies import (
     Bodies,
@@ -65,6 +66,7 @@ CHECKS: tuple[Check, ...] = (
     HeldPosition(),
     RepeatedRows(),
     RepeatedRecordings(),
+    FalseGaps(),
     ClockJitter(),
     InterpolatedRows(),
     MissingTorque(),

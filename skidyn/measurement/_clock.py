@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals, find_segments
+from skidyn.measurement._arrival import rows_after_false_gaps, without_false_gaps
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import is_repeated
@@ -46,7 +47,7 @@ MANY = 0.2
 STEPS = 3.0
 
 
-def regular_clock(time: Array, trajectory: NDArray[np.int64]) -> Array:
+def regular_clock(time: Array, trajectory: NDArray[np.int64], q: Array | None = None) -> Array:
     """Time of every row if the samples were taken at even steps.
 
     Rows are numbered by the recorded time if it is unambiguous, so that missing rows stay missing,
@@ -60,6 +61,9 @@ def regular_clock(time: Array, trajectory: NDArray[np.int64]) -> Array:
         Recorded clock; coarse stamps may repeat.
     trajectory : ndarray of shape (n_samples,)
         Trajectory of every row; gaps in time are kept.
+    q : ndarray of shape (n_samples, n_joints), rad or m, optional
+        Recorded positions, with which gaps are closed across which joints move no further than
+        from any row to the next.
 
     Returns
     -------
@@ -73,6 +77,8 @@ def regular_clock(time: Array, trajectory: NDArray[np.int64]) -> Array:
     >>> regular_clock(np.array([0.0, 0.011, 0.021, 0.03]), np.zeros(4, int)).round(4).tolist()
     [0.0, 0.01, 0.02, 0.03]
     """
+    if q is not None:
+        time = without_false_gaps(time, trajectory, rows_after_false_gaps(time, q, trajectory))
     regular = np.array(time, dtype=float)
     for rows in find_segments(trajectory, time):
         own = regular[rows]
@@ -248,7 +254,7 @@ class ClockJitter(Check):
                 remedy=("--clock regular", "clock='regular'"),
             )
             return
-        if len(measurement.steps) < 50 or np.any(measurement.steps <= 0):
+        if len(measurement.steps) < 50 or np.any(measurement.steps <= 0) or measurement.lost:
             return
         if measurement.repeated > MANY * measurement.n_samples:
             return  # the clock of the rows that are left may be even
@@ -371,10 +377,10 @@ class InterpolatedRows(Check):
         s = measurement.signals
         if measurement.n_joints < 2:
             return
-        moving, on_line = _on_a_line(s, s.q)
+        moving, on_line, knots = _on_a_line(s, s.q)
         if moving > 50 and on_line > ON_A_LINE * moving:
             measurement.stale = True
-            share = 1 - on_line / moving  # one of so many rows, but for those at ends and rests
+            share = knots / moving  # one of so many rows, but for those at ends and rests
             every = round(1 / max(share, 1e-3))
             whole = abs(share * every - 1) < NEARLY
             rate = float(f"{measurement.rate / every if whole else measurement.rate * share:.4g}")
@@ -386,7 +392,7 @@ class InterpolatedRows(Check):
                 remedy=(f"--resample {rate:g}", f"resample_rate={rate:g}"),
             )
             return
-        moving, on_line = _on_a_line(s, measurement.torque)
+        moving, on_line, _ = _on_a_line(s, measurement.torque)
         if moving > 50 and on_line > ON_A_LINE * moving:
             measurement.smoothed = True
             yield self.suspicion(
@@ -397,9 +403,12 @@ class InterpolatedRows(Check):
             )
 
 
-def _on_a_line(signals: Signals, values: Array) -> tuple[int, int]:
-    """Rows in which channels change, and those in which they lie between their neighbours."""
-    on_line, moving = 0, 0
+def _on_a_line(signals: Signals, values: Array) -> tuple[int, int, int]:
+    """Rows in which channels change, those in which they lie between their neighbours, and knots.
+
+    A knot between two rows bends the channels in both, which are one knot together.
+    """
+    on_line, moving, knots = 0, 0, 0
     for rows in signals.segments:
         own, time = values[rows], signals.clock[rows]
         if len(own) < 10:
@@ -408,9 +417,12 @@ def _on_a_line(signals: Signals, values: Array) -> tuple[int, int]:
         moves = np.abs(slope[1:]) > 1e-3 * np.abs(slope).max(axis=0) + 1e-12
         bend = np.abs(np.diff(slope, axis=0)) <= 1e-6 * np.abs(slope).max(axis=0)
         both = moves.sum(axis=1) >= 2
+        straight = np.all(bend | ~moves, axis=1)
         moving += int(both.sum())
-        on_line += int((np.all(bend | ~moves, axis=1) & both).sum())
-    return moving, on_line
+        on_line += int((straight & both).sum())
+        bent = both & ~straight
+        knots += int(np.sum(bent & ~np.r_[False, bent[:-1]]))
+    return moving, on_line, knots
 
 
 class Gaps(Check):

@@ -493,7 +493,9 @@ def _needed(known: Array, wider: Array, torque: Array) -> bool:
         float(np.min(np.sum((torque - basis @ (basis.T @ torque)) ** 2, axis=0)))
         for basis in (known, wider)
     )
-    return bool(n * np.log(left / max(least, 1e-300)) > CORRELATED * further * np.log(n))
+    return left > 0 and bool(
+        n * np.log(left / max(least, 1e-300)) > CORRELATED * further * np.log(n)
+    )
 
 
 def _bent_friction(signals: Signals, joint: int) -> Array:

@@ -22,11 +22,16 @@ CLEAR = 4.0
 #: Share of moving rows backwards in time, and of rows that skip others, for a suspicion and for
 #: certainty.
 BACKWARDS, SKIPPED, SURELY = 0.1, 0.004, 0.02
+#: Moving rows from which a recording is judged by itself, and least work of its drives, as a share
+#: of all work they exchange.
+FEWEST_TURNED, LEAST_WORK = 20, 0.02
 #: Squared steps by velocities, over their mean, from which rows are fast.
 FAST = 0.25
 #: Steps of the clock from which a step is a burst of lost rows, and bursts for a suspicion and for
 #: certainty.
 LONG, FEWEST_BURSTS, SURE_BURSTS = 4.0, 4, 12
+#: How far the usual step may be off that of the clock.
+USUAL = 0.5
 #: Ratio of the number of steps of two or more to that of zero, or between one and two.
 OTHERS = 3.0
 #: Share of the rows that skip others from which rows backwards in time are exchanged with them.
@@ -112,6 +117,22 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
     )
 
 
+def _turned_trajectories(
+    measurement: Measurement, found: Elapsed, backwards: NDArray[np.bool_]
+) -> list[int]:
+    """Recordings in which joints move against their velocities, if all others have none of it."""
+    number = measurement.recording[found.index]
+    counted = found.moving & found.along
+    shares = {
+        int(run): float(np.mean(backwards[own]))
+        for run in np.unique(number)
+        if (own := counted & (number == run)).sum() > FEWEST_TURNED
+    }
+    turned = [run for run, share in shares.items() if share > 1 - BACKWARDS]
+    clear = all(share < BACKWARDS or share > 1 - BACKWARDS for share in shares.values())
+    return turned if clear and len(turned) < len(shares) else []
+
+
 class LostRows(Check):
     """Rows in wrong order of time, or with lost rows between them."""
 
@@ -124,8 +145,13 @@ class LostRows(Check):
         if found is None or not found.moving.any():
             return
         backwards = found.along & (found.steps < -WHOLE) & found.moving
+        turned = _turned_trajectories(measurement, found, backwards)
+        if turned:
+            yield from self._turned(measurement, turned)
+            return
         share = float(backwards.sum() / found.moving.sum())
-        forwards = float(np.mean((found.steps > WHOLE)[found.moving & found.along]))
+        along = found.moving & found.along
+        forwards = float(np.sum(found.steps[along] > WHOLE) / max(along.sum(), 1))
         anyhow = found.size > LARGE and found.disorder > FASTER
         if anyhow or (share > BACKWARDS and forwards > BACKWARDS):
             measurement.lost = True
@@ -143,6 +169,8 @@ class LostRows(Check):
         rows = found.clear & found.moving
         if rows.sum() < 200:
             return
+        if abs(float(np.median(found.steps[rows])) - 1) > USUAL:
+            return  # all steps have another size: a matter of units
         yield from self._bursts(measurement, found, rows)
         if measurement.lost:
             return
@@ -175,6 +203,22 @@ class LostRows(Check):
                 "in one step as their velocities imply",
                 "certain" if share > SURELY else "suspected",
             )
+
+    def _turned(self, measurement: Measurement, turned: list[int]) -> Iterator[Suspicion]:
+        """Recordings in reversed order, unless their torque agrees with the positions instead."""
+        own = np.isin(measurement.recording, turned)
+        power = np.sum(measurement.torque[own] * measurement.signals.dq[own], axis=1)
+        # over a recording, drives do work: friction takes energy in both directions
+        if power.sum() < LEAST_WORK * np.abs(power).sum():
+            return
+        measurement.lost = True
+        yield self.suspicion(
+            f"the rows of trajectories {', '.join(map(str, turned))} are in reversed order of time",
+            "in nearly all their moving rows all joints move against their velocities at once, "
+            "although torques do work along these velocities; reverse the rows of these "
+            "recordings",
+            "certain",
+        )
 
     def _bursts(
         self, measurement: Measurement, found: Elapsed, rows: NDArray[np.bool_]

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import is_held, position_step
@@ -14,6 +15,9 @@ from skidyn.measurement._suspicion import Suspicion
 
 #: Least share of rows with the torque of the previous row, for a torque that is not coarse.
 HELD = 0.3
+#: Steps of a sensor by which a value that was held changes at least, and new values among those
+#: that follow a change.
+STEPS, RECURS = 3.0, 0.5
 #: Least length of a stuck part in rows, and as a multiple of the longest other part of one value;
 #: most stuck parts of a joint; least motion in it, as a share of the range of the joint.
 LONG, LONGER, MOST_STUCK, STUCK_WAY = 40, 5, 8, 0.1
@@ -51,9 +55,8 @@ class HeldTorque(Check):
             torque = measurement.torque[:, k]
             valued = moved & (torque[1:] != 0)  # zeros follow each other in a dead band
             share = np.mean(torque[1:][valued] == torque[:-1][valued]) if valued.any() else 0.0
-            # equal steps are due to a coarse sensor, not a slow one
-            if k not in lost and share > HELD and len(np.unique(torque)) > 0.1 * len(torque):
-                shares[k] = share if np.isnan(position_step(torque)) else 0.0
+            if k not in lost and share > HELD and not _comes_in_steps(torque):
+                shares[k] = share
         held = np.flatnonzero(shares)
         if len(held):
             yield self.suspicion(
@@ -64,6 +67,16 @@ class HeldTorque(Check):
                 "suspected",
                 [int(k) for k in held],
             )
+
+
+def _comes_in_steps(values: Array) -> bool:
+    """Whether values stay equal because the sensor is coarse: few ones recur, one step apart."""
+    changes = np.abs(np.diff(values))
+    changes = changes[changes > 0]
+    step = position_step(values)
+    if np.isfinite(step) and np.median(changes) < STEPS * step:
+        return True
+    return len(np.unique(values)) < RECURS * len(changes)
 
 
 class StuckTorque(Check):
@@ -79,7 +92,7 @@ class StuckTorque(Check):
             for a, b in stuck_parts(measurement, k):
                 yield self.suspicion(
                     f"the torque of {measurement.joint(k)} is stuck in a part of trajectory "
-                    f"{int(s.trajectory[a])}",
+                    f"{int(measurement.recording[a])}",
                     f"from {s.clock[a]:.4g} s to {s.clock[b - 1]:.4g} s it is "
                     f"{measurement.torque[a, k]:.4g} although the joint moves; leave this part out",
                     "suspected",

@@ -79,6 +79,8 @@ class Lengths(Check):
             return
         if measurement.stale or measurement.computed or measurement.odd:
             return
+        if measurement.late_position:
+            return  # poses of another time
         if measurement.torque_scatter < NOISELESS:
             return  # without noise, errors of the derivatives are significant
         fits = fits.without(list(measurement.coarse_torques))  # rounding is not white noise

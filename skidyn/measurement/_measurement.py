@@ -113,12 +113,27 @@ class Measurement:
     millimetres: set[int] = field(default_factory=set, repr=False)
     #: Rows to which positions jump; trajectories end before them.
     leaps: Array = field(init=False, repr=False)
+    #: Number of the recording of every row, which no cut changes.
+    recording: NDArray[np.int64] = field(init=False, repr=False)
+    #: Rows before which the clock has a gap that the motion does not have; it is closed.
+    false_gaps: NDArray[np.intp] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        self.recording = self.signals.trajectory
+        self._close_false_gaps()
         s = self.signals
         self.leaps = find_leaps(s.q, s.clock, s.trajectory)
         if len(self.leaps):  # no other check should interpret a jump as motion
             self.cut(self.leaps.astype(np.intp))
+
+    def _close_false_gaps(self) -> None:
+        """An even clock in place of one with gaps that the motion does not have."""
+        from skidyn.measurement._arrival import rows_after_false_gaps, without_false_gaps
+
+        s = self.signals
+        self.false_gaps = rows_after_false_gaps(s.clock, s.q, s.trajectory)
+        if len(self.false_gaps):  # other mistakes are visible only with an even clock
+            self.signals = s.with_(time=without_false_gaps(s.clock, s.trajectory, self.false_gaps))
 
     def cut(self, rows: NDArray[np.intp]) -> None:
         """End trajectories before some rows, for all checks that follow.

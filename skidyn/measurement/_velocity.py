@@ -40,9 +40,10 @@ MOVING, MOST_MOVE = 0.05, 0.5
 SURE = 0.995
 #: Windows over which velocities are compared with positions, at most.
 WINDOWS = 3000
-#: Lags of the velocity that are tried, s; the least that is reported, s and in time steps; the
+#: Lags of the velocity that are tried, s, and how many times as long ones if none of them is best;
+#: the least that is reported, s and in time steps; the
 #: share of the difference that it takes away; joints that agree and how nearly, s.
-LAGS = np.linspace(-0.1, 0.1, 21)
+LAGS, FARTHER = np.linspace(-0.1, 0.1, 21), 4.0
 SMALLEST, STEPS, TAKEN, AGREEING, NEARLY = 0.006, 1.2, 0.3, 0.75, 0.01
 #: Largest residual of a low pass to be reported, as a share of that of a delay; largest difference
 #: of a common time constant between joints.
@@ -109,6 +110,10 @@ class Velocity(Check):
             if measurement.clock != 1 and _cause(slope, correlation) in ("scale", "other"):
                 continue  # reported when time is in seconds
             groups.setdefault(_cause(slope, correlation), []).append(k)
+        if "other" in groups and set(groups["other"]) <= set(
+            _common_lag(measurement, _lags(measurement))[1]
+        ):
+            del groups["other"]  # they are late
         if not groups:  # in another unit, the noise of a joint at rest looks like motion
             faults += [self._held(measurement, k, runs) for k, runs in measurement.stuck.items()]
         return faults + [self._told(measurement, cause, joints) for cause, joints in groups.items()]
@@ -272,30 +277,14 @@ class VelocityDelay(Check):
     )
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        if measurement.stale:
-            return  # held or interpolated values are always late
-        lags = {
-            k: _lag(measurement.signals, k)
-            for k, (slope, likeness) in enumerate(measurement.velocities)
-            if measurement.excited[k] and likeness > 0.5 and slope > 0.5
-        }
-        told = np.array([lag for lag in lags.values() if np.isfinite(lag)])
-        if not len(told) or len(told) < AGREEING * sum(measurement.excited):
-            return
-        common = float(np.median(told))
-        alike = np.abs(told - common) < max(NEARLY, 0.3 * abs(common))
-        alike &= np.abs(told) > 0.5 * abs(common)  # of two joints one may not be late at all
-        if (
-            abs(common) < max(SMALLEST, STEPS / measurement.rate)
-            or alike.mean() < AGREEING
-            or alike.sum() < min(2, measurement.n_joints)
-        ):
-            yield from self._single(measurement, lags)
+        lags = _lags(measurement)
+        common, own = _common_lag(measurement, lags)
+        if not own:
+            if np.isfinite(common):
+                yield from self._single(measurement, lags)
             return
         late, early = ("velocity", "position") if common > 0 else ("position", "velocity")
         column = "dq" if common > 0 else "q"
-        of = [k for k, lag in lags.items() if np.isfinite(lag)]
-        own = {k: lags[k] for k, near in zip(of, alike, strict=True) if near}
         value = float(f"{abs(_refined(measurement.signals, own)):.3g}")
         measurement.late_position = value if late == "position" else 0.0
         constant = _lowpass(measurement.signals, own)
@@ -304,8 +293,9 @@ class VelocityDelay(Check):
             return
         yield self.suspicion(
             f"the {late} is late relative to the {early} by about {1e3 * value:g} ms",
-            f"at that lag it is the derivative of the position, equally in {int(alike.sum())} of "
-            f"{len(told)} moving joints: it was filtered, or stamped by another clock",
+            f"at that lag it is the derivative of the position, equally in {len(own)} of "
+            f"{sum(map(np.isfinite, lags.values()))} moving joints: it was filtered, or stamped by "
+            "another clock",
             "suspected",
             remedy=(f"--late {column}={value:g}", f"late={{'{column}': {value:g}}}"),
         )
@@ -346,20 +336,60 @@ class VelocityDelay(Check):
             )
 
 
+def _lags(measurement: Measurement) -> dict[int, float]:
+    """Lag of the velocity of every moving joint behind its position, s; NaN where none is found."""
+    if measurement.stale:
+        return {}  # held or interpolated values are always late
+    return {
+        k: _lag(measurement.signals, k)
+        for k, (slope, likeness) in enumerate(measurement.velocities)
+        if measurement.excited[k] and likeness > 0.5 and slope > 0.5
+    }
+
+
+def _common_lag(
+    measurement: Measurement, lags: Mapping[int, float]
+) -> tuple[float, dict[int, float]]:
+    """The usual lag of velocities, s, and those of the joints that share it; none if few do.
+
+    The lag is NaN if those of too few joints are known.
+    """
+    known = {k: lag for k, lag in lags.items() if np.isfinite(lag)}
+    if not known or len(known) < AGREEING * sum(measurement.excited):
+        return float("nan"), {}
+    common = float(np.median(list(known.values())))
+    own = {
+        k: lag
+        for k, lag in known.items()
+        # of two joints one may not be late at all
+        if abs(lag - common) < max(NEARLY, 0.3 * abs(common)) and abs(lag) > 0.5 * abs(common)
+    }
+    shared = len(own) >= max(AGREEING * len(known), min(2, measurement.n_joints))
+    late = abs(common) >= max(SMALLEST, STEPS / measurement.rate)
+    return common, own if shared and late else {}
+
+
 def _lag(signals: Signals, k: int) -> float:
     """Lag of a joint's velocity behind the rate of its position, s; NaN if undetermined."""
-    errors, plain = np.zeros(len(LAGS)), 0.0
-    for window in _windows(signals, k):
-        errors += [window.error(lag) for lag in LAGS]
-        plain += float(np.sum(window.change**2))
-    best = int(np.argmin(errors))
-    if plain <= 0 or best in (0, len(LAGS) - 1) or errors[best] > 0.1 * plain:
+    for lags in (LAGS, FARTHER * LAGS):
+        errors, plain = np.zeros(len(lags)), 0.0
+        for window in _windows(signals, k, lags[-1]):
+            errors += [window.error(lag) for lag in lags]
+            plain += float(np.sum(window.change**2))
+        best = int(np.argmin(errors))
+        if plain <= 0:
+            return float("nan")
+        if best not in (0, len(lags) - 1):
+            break
+    else:
+        return float("nan")
+    if errors[best] > 0.1 * plain:
         return float("nan")
     left, middle, right = errors[best - 1 : best + 2]
     bend = left - 2 * middle + right
-    step = LAGS[1] - LAGS[0]
-    lag = LAGS[best] + step * (0.5 * (left - right) / bend if bend > 0 else 0.0)
-    return float(lag) if errors[best] < (1 - TAKEN) * errors[len(LAGS) // 2] else 0.0
+    step = lags[1] - lags[0]
+    lag = lags[best] + step * (0.5 * (left - right) / bend if bend > 0 else 0.0)
+    return float(lag) if errors[best] < (1 - TAKEN) * errors[len(lags) // 2] else 0.0
 
 
 @dataclass(frozen=True)
@@ -399,12 +429,13 @@ class Windows:
         return float(np.sum((self._over(self._area, lag) - self.change) ** 2))
 
 
-def _windows(signals: Signals, k: int) -> Iterator[Windows]:
+def _windows(signals: Signals, k: int, reach: float) -> Iterator[Windows]:
+    """Windows of a joint that velocities with a lag of up to ``reach`` (s) overlap."""
     for rows in signals.segments:
         time, q, dq = signals.clock[rows], signals.q[rows, k], signals.dq[rows, k]
         if len(time) < 20 or time[-1] - time[0] < 10 * LAGS[-1] or np.any(np.diff(time) <= 0):
             continue
-        begin = time[(time > time[0] + 0.15) & (time < time[-1] - 0.2)]
+        begin = time[(time > time[0] + reach + 0.05) & (time < time[-1] - reach - 0.1)]
         yield Windows(time, q, dq, begin[:: 1 + len(begin) * len(signals.segments) // WINDOWS])
 
 
@@ -413,7 +444,7 @@ def _refined(signals: Signals, lags: Mapping[int, float]) -> float:
     middle = float(np.median(list(lags.values())))
     sign, own = np.sign(middle), []
     for k in lags:
-        windows = list(_windows(signals, k))
+        windows = list(_windows(signals, k, max(LAGS[-1], 1.2 * abs(middle))))
 
         def likelihood(size: float, windows: list[Windows] = windows) -> float:
             return -sum(w.error(sign * size) for w in windows)
@@ -440,7 +471,7 @@ def _lowpass(signals: Signals, lags: Mapping[int, float]) -> float | None:
     """
     constants = []
     for k, lag in lags.items():
-        windows = list(_windows(signals, k))
+        windows = list(_windows(signals, k, max(LAGS[-1], 1.2 * abs(lag))))
 
         def likelihood(
             constant: float, windows: list[Windows] = windows, lag: float = lag

@@ -74,3 +74,32 @@ def test_rows_that_were_lost_in_bursts_under_an_even_clock():
     told = told_of(frame.assign(time=np.concatenate(stamps)))
     assert {name for name, one in told.items() if one.certainty != "noted"} == {"lost_rows"}
     assert "in bursts" in told["lost_rows"].suspicion
+
+
+def test_recordings_in_reversed_order():
+    signals = [c for c in FRAME if c not in ("time", "trajectory")]
+    frame = FRAME.copy()
+    rows = np.flatnonzero(FRAME["trajectory"] == 1)
+    frame.loc[rows, signals] = FRAME[signals].to_numpy()[rows[::-1]]
+
+    told = told_of(frame)["lost_rows"]
+
+    assert told.certainty == "certain"
+    assert "trajectories 1 are in reversed order" in told.suspicion
+
+
+def test_velocities_of_the_other_sign_in_one_recording_are_not_rows_in_reversed_order():
+    frame = FRAME.copy()
+    rows = FRAME["trajectory"] == 1
+    velocities = [c for c in FRAME if c.startswith("dq")]
+    frame.loc[rows, velocities] *= -1
+    told = told_of(frame)
+    assert "lost_rows" not in told
+    assert "velocity" in " ".join(s.suspicion for s in told.values())
+
+
+def test_velocities_in_turns_are_not_lost_rows():
+    velocities = [c for c in FRAME if c.startswith("dq")]
+    told = told_of(FRAME.assign(**{c: FRAME[c] / (2 * np.pi) for c in velocities}))
+    assert "lost_rows" not in told and "constant_torque" not in told
+    assert told["velocity"].remedy.option == "--units dq=rev/s"

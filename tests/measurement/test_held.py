@@ -64,3 +64,10 @@ def test_zeros_of_a_coarse_torque_with_noise_are_not_missing(signals, torque, fo
     coarse = np.round((torque + noise) / 0.3) * 0.3
     told = {s.check for s in found(signals, coarse)}
     assert "missing_torque" not in told
+
+
+def test_a_torque_of_a_slow_bus_in_fine_steps(signals, torque, found):
+    slow = torque.copy()
+    slow[:, 1] = slow[np.arange(len(slow)) // 25 * 25, 1]
+    told = {s.check: s for s in found(signals, np.round(slow, 2))}
+    assert told["held_torque"].joints == (2,)

@@ -95,3 +95,12 @@ def test_a_filtered_velocity_has_no_other_unit(signals, torque, found):
     slow = lfilter([share], [1, share - 1], signals.dq, axis=0)
     told = [s.check for s in found(signals.with_(dq=slow), torque) if s.certainty == "certain"]
     assert "clock_unit" not in told
+
+
+@pytest.mark.parametrize("late", ["q", "dq"])
+def test_a_channel_that_is_very_late(signals, torque, found, late):
+    rows = np.maximum(np.arange(len(signals.q)) - 18, 0)
+    told = found(signals.with_(**{late: getattr(signals, late)[rows]}), torque)
+    told = {s.check: s for s in told if s.certainty != "noted"}
+    assert set(told) == {"velocity_delay"}
+    assert told["velocity_delay"].remedy.option == f"--late {late}=0.18"
