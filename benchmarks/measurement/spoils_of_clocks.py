@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from spoils import Spoil, Spoiled, columns, factor, felt, in_runs, joints_of, moved
+from spoils import Spoil, Spoiled, columns, factor, felt, in_runs, joints_of, moved, shifted
 from spoils_of_parts import ALSO, rows_of, signals_of
 
 from skidyn.robots import Robot
@@ -19,6 +19,43 @@ def reversed_rows(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> 
     for rows in rows_of(log):
         changed.loc[changed.index[rows], names] = log[names].to_numpy()[rows[::-1]]
     return Spoiled(changed, robot, ("velocity",), "", None, ALSO)
+
+
+def reversed_run(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:
+    """One recording that was written from its end to its beginning."""
+    runs, names = rows_of(log), signals_of(log)
+    if len(runs) < 3:
+        return None
+    rows, changed = runs[rng.integers(len(runs))], log.copy()
+    changed.loc[changed.index[rows], names] = log[names].to_numpy()[rows[::-1]]
+    return Spoiled(changed, robot, ("lost_rows",), "", None, ALSO)
+
+
+def batches(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
+    """Stamps of arrival: the rows of a batch follow each other within a tenth of a step."""
+    size, time = int(rng.integers(12, 60)), log["time"].to_numpy().copy()
+    for rows in rows_of(log):
+        own, number = time[rows], np.arange(len(rows))
+        step = float(np.median(np.diff(own)))
+        last = np.minimum(number // size * size + size - 1, len(rows) - 1)
+        time[rows] = own[last] + 0.1 * step * (number % size) / size
+    return Spoiled(log.assign(time=time), robot, ("false_gaps",), "--clock regular")
+
+
+def clock_that_was_set(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled | None:
+    """A clock that was set ahead while joints moved, twice in a recording."""
+    runs = rows_of(log)
+    rows = runs[rng.integers(len(runs))]
+    speeds = np.abs(joints_of(log, "dq", robot)[rows])
+    moving = np.flatnonzero(np.median(speeds / speeds.max(axis=0), axis=1) > 0.3)
+    moving = moving[(moving > 20) & (moving < len(rows) - 20)]
+    if len(moving) < 50:
+        return None
+    time = log["time"].to_numpy().copy()
+    for share in (0.3, 0.7):
+        time[rows[moving[int(share * len(moving))] :]] += rng.uniform(2, 20)
+    time[rows[-1] + 1 :] += 100.0
+    return Spoiled(log.assign(time=time), robot, ("false_gaps",), "--clock regular")
 
 
 def drifting_clock(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
@@ -93,6 +130,10 @@ def before_the_gears(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) 
 CLOCKS: dict[str, Spoil] = {
     "minutes": factor("time", 1 / 60, "clock_unit", "--units time=min"),
     "reversed_rows": reversed_rows,
+    "reversed_run": reversed_run,
+    "batches": batches,
+    "clock_that_was_set": clock_that_was_set,
+    "velocity_very_late": shifted(("dq",), 0.12, 0.25, "velocity_delay", "--late dq="),
     "drifting_clock": drifting_clock,
     "zero_of_a_run": zero_of_a_run,
     "small_zero": small_zero,
