@@ -10,6 +10,7 @@ import numpy as np
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import is_held, position_step
+from skidyn.measurement._placeholder import placeholder_remedy
 from skidyn.measurement._suspicion import Suspicion
 
 #: Least share of rows with the torque of the previous row, for a torque that is not coarse.
@@ -146,8 +147,8 @@ class MissingTorque(Check):
                 f"missing torques of {names} were replaced by zero",
                 f"in {int(rows.sum())} rows, {rows.mean():.1%} (the first in row "
                 f"{int(np.argmax(rows))}), they are zero, but not close to zero in the rows beside "
-                "them; write missing values as empty cells, and read the log with missing='drop', "
-                "or leave these rows out",
+                "them",
                 "certain" if rows.mean() > MANY_MISSING else "suspected",
                 joints,
+                placeholder_remedy(0.0, [("tau", k) for k in joints], measurement.n_joints),
             )
