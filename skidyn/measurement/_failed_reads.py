@@ -12,19 +12,22 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._measures import MANY_MISSING
 from skidyn.measurement._placeholder import CHANNELS, exactly, in_words, placeholder_remedy
 from skidyn.measurement._suspicion import Suspicion
 
 #: Most rows of a failed read. How many times as far as the values before and after it are from
 #: each other, and as nine tenths of the other steps of the channel, it is from both.
-MOST_ROWS, AWAY, BEYOND = 5, 4.0, 4.0
+MOST_ROWS, AWAY, BEYOND, LARGE = 5, 3.0, 3.0, 0.01
 #: Fewest such places with one value in a channel, in all channels, and in all channels to be
 #: certain. In 189 logs without failed reads no value had more than two in a channel, and in public
 #: recordings those with more were less than a third of the short runs of their value.
-FEWEST, FEWEST_OF_ALL, SURE = 2, 4, 10
+FEWEST, FEWEST_OF_ALL, SURE = 2, 3, 10
 #: Least share of the short runs of a value, and of all places to which its channel jumps and from
 #: which it returns, that are such places.
 MOSTLY, LEADING = 0.5, 1 / 3
+#: Share of the other values of a channel that are nearer to the value than a usual jump to it.
+TYPICAL = 0.2
 #: Least share of the failed reads of other channels in which a channel holds their value to have
 #: failed with them, and largest share of its rows with it elsewhere.
 TOGETHER, ELSEWHERE = 0.8, 0.5
@@ -72,10 +75,16 @@ class FailedReads(Check):
                 f"{int(read.rows.sum())} rows, {100 * read.rows.mean():.2g} % (the first is row "
                 f"{int(np.argmax(read.rows))}), are exactly equal to it, and at {read.places} "
                 "places signals jump to it and back; the other checks leave these rows out",
-                "certain" if read.times >= SURE else "suspected",
+                "certain" if read.times >= SURE and _harmful(read) else "suspected",
                 joints,
                 placeholder_remedy(read.value, read.channels, n),
             )
+
+
+def _harmful(read: FailedRead) -> bool:
+    """Whether a diagnosis, which leaves out a few broken positions and torques, would be wrong."""
+    of_velocity = any(quantity == "dq" for quantity, _ in read.channels)
+    return of_velocity or read.rows.mean() > MANY_MISSING
 
 
 def failed_reads(measurement: Measurement) -> list[FailedRead]:
@@ -127,17 +136,23 @@ def _placed(values: Array, trajectory: NDArray[np.int64]) -> dict[float, NDArray
     near = np.zeros(len(values), dtype=int)
     near[begins[away] - 1] += 1  # the step to the value and all steps until the one from it
     near[ends[away]] -= 1
-    steps = np.abs(np.diff(values)[together & (np.cumsum(near)[:-1] == 0)])
+    usual = np.cumsum(near) == 0
+    steps = np.abs(np.diff(values)[together & usual[:-1]])
     steps = steps[steps > 0]  # a joint may rest most of the time
     if not len(steps):
         return {}
-    away &= jump > BEYOND * float(np.quantile(steps, 0.9))
+    spread = float(np.diff(np.quantile(values[usual], [0.05, 0.95]))[0])
+    far = jump > max(BEYOND * float(np.quantile(steps, 0.9)), LARGE * spread)
+    away &= far
     found = {}
     names, counts = np.unique(held[away], return_counts=True)
     for value in names[(counts >= FEWEST) & (counts > LEADING * away.sum())]:
         there = away & (held == value)
         # a pause in the middle of steps always begins from the same value
         several = len(np.unique(before[there])) >= FEWEST
-        if several and there.sum() > MOSTLY * np.sum(held == value):
+        # nor do values far from a dead band return to it at once
+        apart = np.abs(values[usual & (values != value)] - value)
+        typical = np.median(jump[there]) >= np.quantile(apart, TYPICAL)
+        if several and typical and there.sum() > MOSTLY * np.sum(far & (held == value)):
             found[float(value)] = begins[there]
     return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import is_held, position_step
+from skidyn.measurement._measures import MANY_MISSING, is_held, position_step
 from skidyn.measurement._placeholder import placeholder_remedy
 from skidyn.measurement._suspicion import Suspicion
 
@@ -18,8 +18,6 @@ HELD = 0.3
 #: Least length of a stuck part in rows, and as a multiple of the longest other part of one value;
 #: most stuck parts of a joint; least motion in it, as a share of the range of the joint.
 LONG, LONGER, MOST_STUCK, STUCK_WAY = 40, 5, 8, 0.1
-#: Share of rows with missing torques that is certain to be harmful.
-MANY_MISSING = 0.01
 
 
 class HeldTorque(Check):
