@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Placeholder = float | Sequence[float] | Mapping[str, float | Sequence[float]]
 _SIGNAL = re.compile(r"(q|dq|ddq|tau|temp|cmd|i)\d+")
 #: Note about a placeholder that is nowhere.
-_NOWHERE = re.compile(r"placeholder: 0 of \d+ rows hold (\S+) in (\S+)")
+_NOWHERE = re.compile(r"placeholder: 0 of \d+ rows hold (\S+)=(\S+),")
 
 
 class Placeholders:
@@ -61,7 +61,9 @@ class Placeholders:
                     f"placeholder: the log has no {name}; it has "
                     f"{', '.join(map(str, table.columns))}, and all means all its signals."
                 )
-        return self._without(table, [key for key, (rows, _) in self._counts.items() if not rows])
+        rest = [key for key, (rows, _) in self._counts.items() if not rows]
+        self._counts.update(dict.fromkeys(rest, (0, 0)))
+        return self._without(table, rest)
 
     def _without(self, table: pd.DataFrame, keys: Sequence[tuple[str, float]]) -> pd.DataFrame:
         masks = {}
@@ -83,8 +85,8 @@ class Placeholders:
     def notes(self) -> list[str]:
         """What was found, as sentences."""
         return [
-            f"placeholder: {found} of {total} rows hold {value:.17g} in {name}, which became a "
-            "missing value"
+            f"placeholder: {found} of {total} rows hold {name}={repr(value).removesuffix('.0')}, "
+            "which became a missing value"
             for (name, value), (found, total) in self._counts.items()
         ]
 
@@ -104,9 +106,9 @@ def refuse_absent(notes: Sequence[str]) -> None:
     """
     for note in notes:
         if hit := _NOWHERE.match(note):
-            where = "a signal" if hit[2] == "all," else hit[2].rstrip(",")
+            where = "the signals" if hit[1] == "all" else hit[1]
             raise LogError(
-                f"placeholder: no value of {where} equals {hit[1]}; values are compared exactly, "
+                f"placeholder: no value of {where} equals {hit[2]}; values are compared exactly, "
                 "as in the file or in SI units as stated by skidyn check."
             )
 

@@ -225,7 +225,7 @@ def _clean(
     own_trajectories = "trajectory" in table.columns
     signals = [name for name in table.columns if SIGNAL_COLUMN.fullmatch(name)]
     keys = ["time", "trajectory"] if own_trajectories else ["time"]
-    missing = options.missing if options.remedies.placeholder is None else "drop"
+    missing = "drop" if options.remedies.placeholder is not None else options.missing
     table = handle_missing(table, [*keys, *signals], missing, match.notes, source)
     if len(table) < 2:
         raise LogError(f"{source} has {len(table)} row(s); a log needs at least two.")
