@@ -26,7 +26,8 @@ FEWEST, FEWEST_OF_ALL, SURE = 2, 3, 10
 #: Least share of the short runs of a value far from those before and after, and of all places to
 #: which its channel jumps and from which it returns, that are such places.
 MOSTLY, LEADING = 0.5, 1 / 3
-#: Share of the other values of a channel that are nearer to the value than a usual jump to it.
+#: Share of the other values of a channel that are nearer to the value than its long jumps, and
+#: share of jumps that are long.
 TYPICAL = 0.2
 #: Least share of the failed reads of other channels in which a channel holds their value to have
 #: failed with them, and largest share of its rows with it elsewhere.
@@ -152,7 +153,7 @@ def _placed(values: Array, trajectory: NDArray[np.int64]) -> dict[float, NDArray
         several = len(np.unique(before[there])) >= FEWEST
         # nor do values far from a dead band return to it at once
         apart = np.abs(values[usual & (values != value)] - value)
-        typical = np.median(jump[there]) >= np.quantile(apart, TYPICAL)
+        typical = np.quantile(jump[there], 1 - TYPICAL) >= np.quantile(apart, TYPICAL)
         if several and typical and there.sum() > MOSTLY * np.sum(far & (held == value)):
             found[float(value) + 0.0] = begins[there]  # no negative zero
     return found
