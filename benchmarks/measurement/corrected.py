@@ -64,7 +64,9 @@ def read_again(
             robot = robot.with_gravity(now)
         else:
             before = options.get(name)
-            if isinstance(now, dict) and before:
+            if name == "placeholder" and before:  # a quantity may have several
+                now = {k: [*_several(before, k), *_several(now, k)] for k in {**before, **now}}
+            elif isinstance(now, dict) and before:
                 now = {**before, **now}
             elif isinstance(now, list) and before and name == "flip":
                 now = before + now
@@ -73,6 +75,12 @@ def read_again(
         path = Path(folder, "log.parquet")
         frame.to_parquet(path)
         return read_log(path, robot=robot, check=False, **options), robot
+
+
+def _several(values: dict[str, Any], name: str) -> list[Any]:
+    """The values of a name, none if it has none."""
+    own = values.get(name, [])
+    return own if isinstance(own, list) else [own]
 
 
 def gives_back(case: Case, frame: pd.DataFrame, robot: Robot) -> bool:

@@ -66,7 +66,29 @@ def dropouts(quantity: str, share: float) -> Spoil:
         changed = log.copy()
         rows = rng.random(len(log)) < share
         changed.loc[rows, columns(quantity, robot.n_joints)] = 0.0
-        return Spoiled(changed, robot, ("broken_samples", "missing_torque"))
+        return Spoiled(changed, robot, ("failed_reads", "missing_torque"))
+
+    return spoil
+
+
+def failed_reads(value: float, quantities: tuple[str, ...], whole: bool) -> Spoil:
+    """A value in the place of failed reads of one joint, or of the whole bus, in up to 5 %."""
+
+    def spoil(log: pd.DataFrame, robot: Robot, rng: np.random.Generator) -> Spoiled:
+        joint = moved(log, robot, rng)
+        joints = range(robot.n_joints) if whole else [joint]
+        names = [f"{quantity}{k + 1}" for quantity in quantities for k in joints]
+        most = int(rng.integers(1, 4))
+        count = max(int(float(rng.choice([0.005, 0.01, 0.03, 0.05])) * len(log) / most), 5)
+        begins = rng.choice(len(log) - most, count, replace=False)
+        rows = np.unique((begins[:, None] + np.arange(most)).ravel())
+        changed = log.astype(dict.fromkeys(names, float))
+        changed.loc[rows, names] = value
+        told = [*quantities] if whole else names
+        told = ["all"] if whole and len(quantities) == 3 else told
+        option = "--placeholder " + ",".join(f"{name}={value:g}" for name in told)
+        own = tuple(k + 1 for k in joints)
+        return Spoiled(changed, robot, ("failed_reads",), option, own)
 
     return spoil
 
@@ -103,6 +125,11 @@ CHANNELS: dict[str, Spoil] = {
     "mean_taken_off": tared(True),
     "position_dropouts": dropouts("q", 0.003),
     "torque_dropouts": dropouts("tau", 0.005),
+    "failed_reads_of_the_bus": failed_reads(9999.0, ("q", "dq", "tau"), True),
+    "failed_reads_as_minus_one": failed_reads(-1.0, ("q",), True),
+    "failed_reads_as_zero": failed_reads(0.0, ("tau",), True),
+    "failed_reads_of_a_joint": failed_reads(65535.0, ("q", "dq"), False),
+    "failed_reads_of_a_velocity": failed_reads(0.0, ("dq",), False),
     "overflow": overflow,
     "acceleration_sign": accelerations(-1.0, "--flip #"),
     "acceleration_degrees": accelerations(180 / np.pi, "--units #=deg/s^2"),

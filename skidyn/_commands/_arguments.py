@@ -214,6 +214,12 @@ def with_remedies(parser: Any) -> None:
         help="drop: leave out rows with missing or infinite values (default: refuse the log)",
     )
     fix.add_argument(
+        "--placeholder",
+        metavar="9999,q=-1,..",
+        help="values that stand for failed reads, of all signals, quantities or columns; rows with "
+        "exactly such a value are left out",
+    )
+    fix.add_argument(
         "--drop-repeated", action="store_true", help="leave out rows that repeat the one before"
     )
     fix.add_argument(

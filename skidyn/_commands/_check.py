@@ -16,10 +16,10 @@ from skidyn._exceptions import LogWarning
 
 DESCRIPTION = """\
 Check whether the signals of a log agree with their names and units. Problems are listed by their
-influence on the results, with evidence and the option that fixes each: units, clock, repeated rows,
-and with a robot also signs and order of joints, gravity, torque without sign, currents taken for
-torques, and delay. A table then gives the rate, the resolution, and the range and number of
-reversals of each joint.
+influence on the results, with evidence and the option that fixes each: failed reads, units, clock,
+repeated rows, and with a robot also signs and order of joints, gravity, torque without sign,
+currents taken for torques, and delay. A table then gives the rate, the resolution, and the range
+and number of reversals of each joint.
 
   skidyn check run1.csv run2.csv
   skidyn check run1.csv --urdf robot.urdf

@@ -153,6 +153,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
         **{name: pairs(name, said.get(name), numbers=True) for name in NUMBERS},
         **{name: said.get(name) for name in AS_GIVEN},
         "derive": listed(said.get("derive")),
+        "placeholder": placeholder_option(said.get("placeholder")),
         "gravity": gravity_option(said.get("gravity")),
     }
     # defaults are left to read_log, so that a script made from this contains only given options
@@ -226,6 +227,17 @@ def order_option(text: str | None) -> Any:
             "motion=2,1,3,tau=3,2,1"
         )
     return {q: joint_numbers(numbers) for q, numbers in zip(parts[1::2], parts[2::2], strict=True)}
+
+
+def placeholder_option(text: str | None) -> Any:
+    """``9999,q=-1`` as a mapping of all signals, quantities or columns to their values."""
+    if text is None or text.lstrip().startswith(("{", "[")):
+        return json_option("placeholder", text)
+    said: dict[str, list[float]] = {}
+    for word in listed(text):
+        name, _, value = word.rpartition("=")
+        said.setdefault(name.strip() or "all", []).append(number("placeholder", value))
+    return said
 
 
 #: A number, and a delay that grows with the time: 0.013+0.0005*t.

@@ -154,7 +154,7 @@ RECORDED: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("columns", "units", "drive_gains", "joints", "effects"), (str, type(None))),
     **dict.fromkeys(("gravity", "flip", "order", "combine", "gain"), (str, type(None))),
     "summed": (str, type(None)),
-    **dict.fromkeys(("zero", "late", "lowpass", "derive"), (str, type(None))),
+    **dict.fromkeys(("zero", "late", "lowpass", "derive", "placeholder"), (str, type(None))),
     **dict.fromkeys(("torque_sign", "clock", "missing", "topics"), (str, type(None))),
     **dict.fromkeys(
         ("unwrap", "drop_repeated", "split_leaps", "restore_gravity", "force"), (bool, type(None))

@@ -17,6 +17,7 @@ from skidyn._progress import track
 from skidyn.logs._bounds import MAX_BYTES
 from skidyn.logs._folders import find_runs, read_runs
 from skidyn.logs._formats import decode
+from skidyn.logs._placeholders import Placeholder, refuse_absent
 from skidyn.logs._quality import check_log
 from skidyn.logs._remedies import REMEDIES, Remedies, turn_gravity
 from skidyn.logs._table import ColumnMap, TableOptions, build_table
@@ -40,6 +41,7 @@ def read_log(
     rate: float | None = None,
     resample_rate: float | None = None,
     missing: Literal["error", "drop"] = "error",
+    placeholder: Placeholder | None = None,
     split_gaps: float | Literal["auto"] | None = "auto",
     split_dwells: float | None = None,
     order: Sequence[int] | Mapping[str, Sequence[int]] | None = None,
@@ -92,6 +94,12 @@ def read_log(
         one file have several. Faster signals are averaged over one step of it.
     missing : {"error", "drop"}, default="error"
         Rows with NaN or infinite values: refuse the log, or leave them out with a warning.
+    placeholder : float, sequence of float, or mapping, optional
+        Values that stand for failed reads and are taken for missing ones: ``9999`` in any signal,
+        ``{"q": -1, "tau3": [0, 65535]}`` by quantity or column. Only values that are exactly equal
+        are missing, also those that were measured; they are compared as in the file, and where none
+        is equal in SI units. Rows with missing values are left out with a warning, as with
+        ``missing="drop"``.
     split_gaps : float, s, "auto" or None, default="auto"
         A time step longer than this begins a new trajectory; ``"auto"``: longer than 20 median
         steps and 0.2 s, in logs that have no trajectory column of their own.
@@ -220,6 +228,7 @@ def read_log(
             split_leaps=split_leaps,
             restore_gravity=restore_gravity,
             derive=derive,
+            placeholder=placeholder,
         ),
         needs_torque,
     )
@@ -247,6 +256,7 @@ def read_log(
         tables.append(table)
     frame = pandas.concat(tables, ignore_index=True) if len(tables) > 1 else tables[0]
     notes = said + _told_once(notes, len(tables))
+    refuse_absent(notes)
     frame.attrs = {"joint_names": joints, "files": files, "notes": notes}
     if gravity is not None and robot is not None:
         frame.attrs["gravity"] = robot.gravity.tolist()

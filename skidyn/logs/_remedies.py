@@ -12,6 +12,7 @@ import numpy as np
 
 from skidyn._exceptions import LogError
 from skidyn._signals import find_segments
+from skidyn.logs._placeholders import Placeholder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,6 +41,7 @@ REMEDIES = (
     "restore_gravity:",
     "derive:",
     "unwrap:",
+    "placeholder:",
     "missing:",
     "order:",
     "resample:",
@@ -65,6 +67,7 @@ class Remedies:
     split_leaps: bool = False
     restore_gravity: bool = False
     derive: Sequence[str] = ()
+    placeholder: Placeholder | None = None
 
 
 def mend_columns(

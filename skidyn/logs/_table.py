@@ -29,6 +29,7 @@ from skidyn.logs._clock import (
     split_trajectories,
 )
 from skidyn.logs._files import Channel
+from skidyn.logs._placeholders import Placeholders
 from skidyn.logs._remedies import Remedies, mend_columns, mend_rows, restore_gravity
 
 if TYPE_CHECKING:
@@ -72,6 +73,7 @@ def build_table(
     The columns are ``time, trajectory, q1 .., dq1 .., [ddq1 ..], tau1 .., [temp1 ..]`` and further
     ones. ``source`` is the file in the LogError for a log that cannot be used unchanged.
     """
+    failed = Placeholders(options.remedies.placeholder)
     match = match_names(
         list(dict.fromkeys(str(name) for c in channels for name in c.table.columns)),
         robot_joints=None if options.robot is None else options.robot.joint_names,
@@ -83,7 +85,7 @@ def build_table(
     tables = [_renamed(channel, match) for channel in channels]
     times = clocks(tables, options.rate, [f"{source} ({c.name})" for c in channels])
     tables = [
-        _in_si(table.assign(time=time), match, source, options)
+        _in_si(table.assign(time=time), match, source, options, failed)
         for table, time in zip(tables, times, strict=True)
     ]
     _refuse_unused_units(tables, options.units or {}, source, match.notes)
@@ -98,6 +100,9 @@ def build_table(
     if options.robot is None and by_number and stated and len(stated[0]) == n:
         match.joint_names = list(stated[0])
     table = mend_columns(table, n, match.joint_names, options.remedies, match.notes)
+    if failed:
+        table = failed.remove_rest(table)
+        match.notes += failed.notes()
     return _in_order(_clean(table, n, match, source, options), n), match
 
 
@@ -124,7 +129,11 @@ def _renamed(channel: Channel, match: NameMatch) -> pd.DataFrame:
 
 
 def _in_si(
-    table: pd.DataFrame, match: NameMatch, source: str, options: TableOptions
+    table: pd.DataFrame,
+    match: NameMatch,
+    source: str,
+    options: TableOptions,
+    failed: Placeholders,
 ) -> pd.DataFrame:
     """The numeric columns of a table, in SI units."""
     signals = [name for name in table.columns if _quantity(name) is not None]
@@ -139,7 +148,7 @@ def _in_si(
         for target, unit in (options.units or {}).items()
         if target in names or target in names.values()
     }
-    return convert_units(table[kept], mine)
+    return convert_units(failed.remove(table[kept]), mine)
 
 
 def _quantity(name: str) -> str | None:
@@ -216,7 +225,8 @@ def _clean(
     own_trajectories = "trajectory" in table.columns
     signals = [name for name in table.columns if SIGNAL_COLUMN.fullmatch(name)]
     keys = ["time", "trajectory"] if own_trajectories else ["time"]
-    table = handle_missing(table, [*keys, *signals], options.missing, match.notes, source)
+    missing = "drop" if options.remedies.placeholder is not None else options.missing
+    table = handle_missing(table, [*keys, *signals], missing, match.notes, source)
     if len(table) < 2:
         raise LogError(f"{source} has {len(table)} row(s); a log needs at least two.")
     time = table["time"].to_numpy()

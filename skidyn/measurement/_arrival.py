@@ -115,7 +115,7 @@ class FalseGaps(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if not len(measurement.false_gaps):
             return
-        number = measurement.recording[measurement.false_gaps]
+        number = measurement.recorded.trajectory[measurement.false_gaps]
         runs, counts = np.unique(number, return_counts=True)
         batches = bool(np.any(counts >= BATCHES))
         told = (

@@ -38,6 +38,7 @@ from skidyn.measurement._crosstalk import Crosstalk
 from skidyn.measurement._differential import MotorsOfDifferential
 from skidyn.measurement._divided import DividedRecordings
 from skidyn.measurement._elapsed import LostRows
+from skidyn.measurement._failed_reads import FailedReads
 from skidyn.measurement._held import HeldPosition, HeldTorque, MissingTorque, StuckTorque
 from skidyn.measurement._joint_gravity import JointGravity
 from skidyn.measurement._lengths import Lengths
@@ -56,6 +57,7 @@ from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDel
 TARED, UNSIGNED = TaredTorque(), UnsignedTorque()
 #: The only list of checks in skidyn.
 CHECKS: tuple[Check, ...] = (
+    FailedReads(),
     LostRows(),
     ClockUnit(),
     PositionUnit(),
@@ -178,8 +180,8 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
 
 #: Checks whose certain suspicions make every fit of the robot meaningless, and checks of which any
 #: suspicion does.
-_UNITS = CHECKS[:5]
-_SCALES = (*CHECKS[1:3], TARED)
+_UNITS = CHECKS[1:6]
+_SCALES = (*CHECKS[2:4], TARED)
 
 
 def names_in_doubt(found: list[Suspicion]) -> list[str]:

@@ -121,7 +121,7 @@ def _turned_trajectories(
     measurement: Measurement, found: Elapsed, backwards: NDArray[np.bool_]
 ) -> list[int]:
     """Recordings in which joints move against their velocities, if all others have none of it."""
-    number = measurement.recording[found.index]
+    number = measurement.recorded.trajectory[found.index]
     counted = found.moving & found.along
     shares = {
         int(run): float(np.mean(backwards[own]))
@@ -206,7 +206,7 @@ class LostRows(Check):
 
     def _turned(self, measurement: Measurement, turned: list[int]) -> Iterator[Suspicion]:
         """Recordings in reversed order, unless their torque agrees with the positions instead."""
-        own = np.isin(measurement.recording, turned)
+        own = np.isin(measurement.recorded.trajectory, turned)
         power = np.sum(measurement.torque[own] * measurement.signals.dq[own], axis=1)
         # over a recording, drives do work: friction takes energy in both directions
         if power.sum() < LEAST_WORK * np.abs(power).sum():

@@ -10,7 +10,8 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import is_held, position_step
+from skidyn.measurement._measures import MANY_MISSING, is_held, position_step
+from skidyn.measurement._placeholder import placeholder_remedy
 from skidyn.measurement._suspicion import Suspicion
 
 #: Least share of rows with the torque of the previous row, for a torque that is not coarse.
@@ -21,8 +22,6 @@ STEPS, RECURS = 3.0, 0.5
 #: Least length of a stuck part in rows, and as a multiple of the longest other part of one value;
 #: most stuck parts of a joint; least motion in it, as a share of the range of the joint.
 LONG, LONGER, MOST_STUCK, STUCK_WAY = 40, 5, 8, 0.1
-#: Share of rows with missing torques that is certain to be harmful.
-MANY_MISSING = 0.01
 
 
 class HeldTorque(Check):
@@ -92,7 +91,7 @@ class StuckTorque(Check):
             for a, b in stuck_parts(measurement, k):
                 yield self.suspicion(
                     f"the torque of {measurement.joint(k)} is stuck in a part of trajectory "
-                    f"{int(measurement.recording[a])}",
+                    f"{int(measurement.recorded.trajectory[a])}",
                     f"from {s.clock[a]:.4g} s to {s.clock[b - 1]:.4g} s it is "
                     f"{measurement.torque[a, k]:.4g} although the joint moves; leave this part out",
                     "suspected",
@@ -159,8 +158,8 @@ class MissingTorque(Check):
                 f"missing torques of {names} were replaced by zero",
                 f"in {int(rows.sum())} rows, {rows.mean():.1%} (the first in row "
                 f"{int(np.argmax(rows))}), they are zero, but not close to zero in the rows beside "
-                "them; write missing values as empty cells, and read the log with missing='drop', "
-                "or leave these rows out",
+                "them",
                 "certain" if rows.mean() > MANY_MISSING else "suspected",
                 joints,
+                placeholder_remedy(0.0, [("tau", k) for k in joints], measurement.n_joints),
             )

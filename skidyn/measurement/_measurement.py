@@ -111,15 +111,15 @@ class Measurement:
     mixed: bool = field(default=False, repr=False)
     clock: float = field(default=1.0, repr=False)
     millimetres: set[int] = field(default_factory=set, repr=False)
+    #: The motion before trajectories were cut and gaps of the clock were closed.
+    recorded: Signals = field(init=False, repr=False)
     #: Rows to which positions jump; trajectories end before them.
     leaps: Array = field(init=False, repr=False)
-    #: Number of the recording of every row, which no cut changes.
-    recording: NDArray[np.int64] = field(init=False, repr=False)
     #: Rows before which the clock has a gap that the motion does not have; it is closed.
     false_gaps: NDArray[np.intp] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self.recording = self.signals.trajectory
+        self.recorded = self.signals
         self._close_false_gaps()
         s = self.signals
         self.leaps = find_leaps(s.q, s.clock, s.trajectory)
@@ -148,6 +148,27 @@ class Measurement:
         first[1:] = s.trajectory[1:] != s.trajectory[:-1]
         first[rows] = 1
         self.signals = s.with_(trajectory=np.cumsum(first))
+        self._forget()
+
+    def leave_out(self, rows: NDArray[np.bool_]) -> None:
+        """Leave rows out, for all checks that follow.
+
+        Velocities that are differences of the positions become those of the rows that are left.
+
+        Parameters
+        ----------
+        rows : ndarray of shape (n_samples,) of bool
+            Rows that were not read.
+        """
+        s, left = self.recorded, self.recorded.take(~rows)
+        if np.allclose(s.dq, _differences(s)):
+            left = left.with_(dq=_differences(left))
+        self.signals, self.torque = left, self.torque[~rows]
+        self._forget()
+        self.__post_init__()
+
+    def _forget(self) -> None:
+        """Forget what was computed from other rows or trajectories."""
         for name, value in vars(type(self)).items():
             if isinstance(value, cached_property):
                 self.__dict__.pop(name, None)
@@ -393,3 +414,12 @@ class Measurement:
             lost = self.missing[:, k]
             filled[lost, k] = np.interp(rows[lost], rows[~lost], filled[~lost, k])
         return filled
+
+
+def _differences(s: Signals) -> Array:
+    """Central differences of the positions; zero where a row is alone."""
+    rates = np.zeros_like(s.q)
+    for rows in s.segments:
+        if rows.stop - rows.start > 1:
+            rates[rows] = np.gradient(s.q[rows], s.clock[rows], axis=0)
+    return rates

@@ -29,6 +29,8 @@ FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
 MOSTLY_ZERO, IDLE_WAY = 0.3, 0.01
 #: Least rows, and time in s, at an end of a recording without changes of torque, to be reported.
 IDLE_ROWS, IDLE_TIME = 8, 0.05
+#: Share of rows with missing values that is certain to be harmful.
+MANY_MISSING = 0.01
 #: Fewest places with zeros instead of missing torques; least ratio of the torque beside them to
 #: the median torque: near a true zero it is small.
 FEWEST_MISSING, JUMPS = 5, 0.4

@@ -82,6 +82,23 @@ def test_rows_that_are_left_out_are_counted(tmp_path, capsys):
     assert "1 of 1198 rows repeat the time of the previous row" in told
 
 
+def test_failed_reads_are_told_with_an_option_that_leaves_them_out(tmp_path, capsys):
+    failed = LOG.copy()
+    failed.loc[10:400:13, ["q1", "q2", "tau1"]] = -1.0
+    failed.loc[500:900:13, "dq1"] = 9999.0
+    failed.to_csv(tmp_path / "log.csv", index=False)
+    words = ["check", str(tmp_path / "log.csv")]
+    assert main(words) == 0
+    told = capsys.readouterr().out
+    assert "--placeholder q=-1,tau1=-1,dq1=9999" in told
+    assert main([*words, "--placeholder", "9999,q=-1,tau1=-1"]) == 0
+    told = capsys.readouterr().out
+    assert f"note: placeholder: 31 of {len(LOG)} rows hold all=9999" in told
+    assert "stands for failed reads" not in told
+    assert main([*words, "--placeholder", "q=-2"]) == 2
+    assert "no value of q equals -2" in capsys.readouterr().err
+
+
 def test_a_file_without_a_header_is_read_by_positions(tmp_path, capsys):
     path = str(tmp_path / "log.csv")
     LOG.drop(columns="trajectory").to_csv(path, index=False, header=False)

@@ -57,7 +57,9 @@ def test_positions_that_leap_to_zero_spoil_no_other_check(recorded, told_of):
     frame = recorded.frame.copy()
     lost = np.random.default_rng(0).random(len(frame)) < 0.005
     frame.loc[lost, ["q1", "q2"]] = 0.0
-    assert {s.certainty for s in told_of(frame).values()} <= {"noted"}
+    told = told_of(frame)
+    assert told.pop("failed_reads").remedy.option == "--placeholder q=0"
+    assert {s.certainty for s in told.values()} <= {"noted"}
 
 
 def test_a_torque_of_one_sign_before_drives_are_enabled_is_not_cut(recorded, told_of):

@@ -30,17 +30,26 @@ def test_missing_torques_that_were_replaced_by_zero(signals, torque, found):
     lost = np.random.default_rng(0).choice(len(torque) - 10, 60, replace=False)
     holes = torque.copy()
     for start in lost:
-        holes[start : start + 5] = 0.0
+        holes[start : start + 8] = 0.0
     told = {s.check: s for s in found(signals, holes)}
     assert told["missing_torque"].joints == (1, 2)
+    assert told["missing_torque"].remedy.option == "--placeholder tau=0"
     assert "dead_band" not in told
 
 
 def test_zeros_of_one_joint(signals, torque, found):
     holes = torque.copy()
-    holes[np.random.default_rng(1).choice(len(torque), 40, replace=False), 0] = 0.0
+    begins = np.random.default_rng(1).choice(len(torque) - 10, 40, replace=False)
+    holes[(begins[:, None] + np.arange(8)).ravel(), 0] = 0.0
     told = {s.check: s for s in found(signals, holes)}
     assert told["missing_torque"].joints == (1,)
+
+
+def test_single_zeros_are_told_as_failed_reads_only(signals, torque, found):
+    holes = torque.copy()
+    holes[np.random.default_rng(1).choice(len(torque), 40, replace=False), 0] = 0.0
+    told = {s.check: s for s in found(signals, holes)}
+    assert told["failed_reads"].joints == (1,) and "missing_torque" not in told
 
 
 def test_a_wide_dead_band_is_neither_held_nor_missing(recorded, told_of):
@@ -50,13 +59,13 @@ def test_a_wide_dead_band_is_neither_held_nor_missing(recorded, told_of):
     assert "dead_band" in told and not told & {"held_torque", "missing_torque"}
 
 
-def test_lost_samples_of_a_nearly_constant_torque_are_missing(signals, torque, found):
+def test_lost_samples_of_a_nearly_constant_torque_are_failed_reads(signals, torque, found):
     """They are no jumps from one end of its range to the other."""
     holes = torque.copy()
     holes[:, 0] = 15 + 0.01 * torque[:, 0]
     holes[np.random.default_rng(1).choice(len(torque), 40, replace=False), 0] = 0.0
     told = {s.check: s for s in found(signals, holes)}
-    assert told["missing_torque"].joints == (1,) and "overflowed_torque" not in told
+    assert told["failed_reads"].joints == (1,) and "overflowed_torque" not in told
 
 
 def test_zeros_of_a_coarse_torque_with_noise_are_not_missing(signals, torque, found):

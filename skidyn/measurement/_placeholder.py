@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Words and the remedy for values that stand for missing ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+#: Quantities of a measurement, and their plurals.
+CHANNELS = {"q": "positions", "dq": "velocities", "tau": "torques"}
+
+
+def placeholder_remedy(
+    value: float, channels: Sequence[tuple[str, int]], n: int
+) -> tuple[str, str]:
+    """Option and argument that read a value as a missing one.
+
+    Parameters
+    ----------
+    value : float
+        As in the columns.
+    channels : sequence of (str, int)
+        Quantity and joint, from 0, of the columns.
+    n : int
+        Number of joints.
+    """
+    if len(set(channels)) == len(CHANNELS) * n:
+        names = ["all"]
+    else:
+        names = []
+        for quantity in CHANNELS:
+            joints = [k for own, k in channels if own == quantity]
+            names += [quantity] if len(joints) == n else [f"{quantity}{k + 1}" for k in joints]
+    option = ",".join(f"{name}={exactly(value)}" for name in names)
+    return f"--placeholder {option}", f"placeholder={dict.fromkeys(names, value)}"
+
+
+def exactly(value: float) -> str:
+    """A number as short as possible, but with all digits.
+
+    Parameters
+    ----------
+    value : float
+        A number.
+
+    Examples
+    --------
+    >>> exactly(-1.0), exactly(65535.0), exactly(174.51514)
+    ('-1', '65535', '174.51514')
+    """
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value).removesuffix(".0")
+
+
+def in_words(channels: Sequence[tuple[str, int]], n: int) -> str:
+    """Channels for a sentence.
+
+    Parameters
+    ----------
+    channels : sequence of (str, int)
+        Quantity and joint, from 0.
+    n : int
+        Number of joints.
+
+    Examples
+    --------
+    >>> in_words([("q", 0), ("q", 1), ("dq", 1)], 2)
+    'positions of all joints and velocities of joint 2'
+    """
+    alike: dict[tuple[int, ...], list[str]] = {}
+    for quantity, name in CHANNELS.items():
+        if joints := tuple(k for own, k in channels if own == quantity):
+            alike.setdefault(joints, []).append(name)
+    told = []
+    for joints, names in alike.items():
+        numbers = ", ".join(str(k + 1) for k in joints)
+        owner = f"joint{'s' if len(joints) > 1 else ''} {numbers}"
+        told.append(f"{', '.join(names)} of {'all joints' if len(joints) == n > 1 else owner}")
+    return " and ".join(told)
