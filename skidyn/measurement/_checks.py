@@ -34,6 +34,7 @@ from skidyn.measurement._clock import (
 from skidyn.measurement._commanded import CommandedMotion
 from skidyn.measurement._copies import CopiedTorque, RepeatedRecordings
 from skidyn.measurement._crosstalk import Crosstalk
+from skidyn.measurement._description import DescriptionUnits
 from skidyn.measurement._differential import MotorsOfDifferential
 from skidyn.measurement._divided import DividedRecordings
 from skidyn.measurement._elapsed import LostRows
@@ -55,6 +56,7 @@ from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDel
 TARED, UNSIGNED = TaredTorque(), UnsignedTorque()
 #: The only list of checks in skidyn.
 CHECKS: tuple[Check, ...] = (
+    DescriptionUnits(),
     LostRows(),
     ClockUnit(),
     PositionUnit(),
@@ -176,8 +178,8 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
 
 #: Checks whose certain suspicions make every fit of the robot meaningless, and checks of which any
 #: suspicion does.
-_UNITS = CHECKS[:5]
-_SCALES = (*CHECKS[1:3], TARED)
+_UNITS = CHECKS[1:6]
+_SCALES = (*CHECKS[2:4], TARED)
 
 
 def names_in_doubt(found: list[Suspicion]) -> list[str]:
