@@ -25,12 +25,13 @@ from skidyn.measurement._plausible import (
     shape_of,
     wrong_units,
 )
+from skidyn.measurement._readings import FEWEST_ROWS, MOST_ROWS
 from skidyn.measurement._suspicion import Certainty, Suspicion
 from skidyn.robots import Robot
 
 #: Log-likelihood that other units must gain to be certain, and to be preferred to likelier ones.
 SURE, LEAST = 40.0, 15.0
-#: Largest factor between torques and those of bodies of the right masses.
+#: Largest factor between torques and those of bodies whose masses are about right.
 USUAL = 2.5
 #: Number of links that are listed by name.
 LISTED = 6
@@ -48,15 +49,9 @@ class DescriptionUnits(Check):
         found = [] if robot is None else wrong_units(robot)
         if robot is None or not found:
             return
-        found, gain = _decided(measurement, robot, found)
-        certain = gain > SURE and not measurement.identified
+        found, told = _decided(measurement, robot, found)
+        certain = bool(told) and not measurement.identified
         certainty: Certainty = "certain" if certain else "suspected"
-        told = (
-            f"; with them in {'SI units' if len(found) > 1 else 'the right unit'}, the rigid-body "
-            f"torque explains the measured torque better by {gain:.0f} (log-likelihood)"
-            if gain > SURE
-            else ""
-        )
         for wrong in found:
             yield self.suspicion(
                 _suspicion(robot, wrong),
@@ -70,28 +65,68 @@ class DescriptionUnits(Check):
 
 def _decided(
     measurement: Measurement, robot: Robot, found: list[WrongUnit]
-) -> tuple[list[WrongUnit], float]:
-    """Units among likely ones that explain the torque best, and their log-likelihood gain.
+) -> tuple[list[WrongUnit], str]:
+    """The likely units that explain the torque best, and its evidence; empty if it has none.
 
     Other checks have not yet looked at the log, so its rows are not kept.
     """
     fits = Measurement(measurement.signals, measurement.torque, robot, measurement.joint_names).fits
     if fits is None or not any(fits.usable(k) for k in range(fits.n_joints)):
-        return found, 0.0
-    tried = []
-    for units in product(*((wrong.unit, *wrong.others) for wrong in found)):
-        own = [
-            replace(wrong, unit=unit, factor=UNITS[wrong.quantity][unit]) if unit else wrong
-            for wrong, unit in zip(found, units, strict=True)
-        ]
-        tried.append((own, _gain(fits, mended(robot, own))))
-    likeliest, gain = tried[0]
-    best, most = max(tried, key=lambda item: item[1])
-    if most > gain + LEAST:
-        likeliest, gain = [replace(wrong, others=()) for wrong in best], most
-    elif len(tried) > 1 and gain > max(other for _, other in tried[1:]) + LEAST:
-        likeliest = [replace(wrong, others=()) for wrong in likeliest]
-    return _with_grams(fits, robot, likeliest), gain
+        return found, ""
+    fits = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+    tried = [(own, _gain(fits, mended(robot, own))) for own in _readings(robot, found)]
+    best = max(gain for _, gain in tried)
+    own, gain = next((own, gain) for own, gain in tried if gain >= best - LEAST)
+    rivals = {tuple(w.unit for w in other) for other, gain in tried if gain >= best - LEAST}
+    if gain > SURE and len(rivals) == 1:
+        own = [replace(wrong, others=()) for wrong in own]
+    own = _with_grams(fits, robot, own)
+    right = f"; with {'SI units' if len(own) > 1 else 'the right unit'}, "
+    before, after = _multiple(fits), _multiple(fits.of(mended(robot, own)))
+    if gain > SURE:
+        return own, (
+            f"{right}the rigid-body torque explains the measured torque better by {gain:.0f} "
+            "(log-likelihood)"
+        )
+    if gain > -LEAST and _usual(after) and not _usual(before):
+        return own, f"{right}the torque is {after:.2g} times that of the bodies, not {before:.2g}"
+    return own, ""
+
+
+def _multiple(fits: Fits) -> float:
+    """Median multiple of the torque of the stated bodies; NaN if it contains none of it."""
+    gain = fits.nominal(Reading()).gain
+    gain = gain[np.isfinite(gain) & (gain > 0)]
+    return float(np.median(gain)) if len(gain) else np.nan
+
+
+def _usual(multiple: float) -> bool:
+    """Whether a multiple may be due to masses that differ a little."""
+    return bool(abs(np.log(multiple)) < np.log(USUAL))
+
+
+def _readings(robot: Robot, found: list[WrongUnit]) -> Iterator[list[WrongUnit]]:
+    """What was found in all likely units, the likeliest first, and then with masses in grams.
+
+    Where lengths or inertias are in another unit, too, the density of links is hardly known.
+    """
+    bodies = dict.fromkeys(tuple(wrong.bodies) for wrong in found if wrong.quantity != "mass")
+    heavy = [_grams(robot, own) for own in bodies]
+    beside = [[w, *wrong_units(mended(robot, [w]))] for w in heavy]
+    for every in (found, *(own for own in beside if sum(w.quantity == "mass" for w in own) < 2)):
+        for units in product(*((wrong.unit, *wrong.others) for wrong in every)):
+            yield [
+                wrong
+                if unit == wrong.unit
+                else replace(wrong, unit=unit, factor=UNITS[wrong.quantity][unit], others=())
+                for wrong, unit in zip(every, units, strict=True)
+            ]
+
+
+def _grams(robot: Robot, bodies: Sequence[int]) -> WrongUnit:
+    """Masses of some bodies in grams, of which their density says nothing."""
+    mass = np.asarray(robot.inertial_parameters)[list(bodies), 0]
+    return WrongUnit("mass", "g", GRAMS, list(bodies), np.inf, bodies[int(np.argmax(mass))])
 
 
 def _gain(fits: Fits, robot: Robot) -> float:
@@ -111,19 +146,16 @@ def _with_grams(fits: Fits, robot: Robot, found: list[WrongUnit]) -> list[WrongU
     every = np.flatnonzero(np.asarray(robot.inertial_parameters)[:, 0] > 0).tolist()
     if not any(wrong.bodies == every for wrong in inertias):
         return found
-    gain = fits.of(mended(robot, found)).nominal(Reading()).gain
-    gain = gain[np.isfinite(gain) & (gain > 0)]
-    if not len(gain) or abs(np.log(GRAMS * np.median(gain))) > np.log(USUAL):
+    if not _usual(GRAMS * _multiple(fits.of(mended(robot, found)))):
         return found
     units = {factor: unit for unit, factor in UNITS["inertia"].items()}
     grams = [
-        replace(w, factor=GRAMS * w.factor, unit=units.get(GRAMS * w.factor, f"g {w.unit[3:]}"))
+        replace(w, factor=GRAMS * w.factor, unit=units.get(GRAMS * w.factor, w.unit))
         if w in inertias
         else w
         for w in found
     ]
-    most = int(np.argmax(shape_of(robot).mass))
-    return [WrongUnit("mass", "g", GRAMS, every, np.inf, most), *grams]
+    return [_grams(robot, every), *grams]
 
 
 def _links(robot: Robot, bodies: Sequence[int]) -> str:
@@ -141,7 +173,7 @@ def _suspicion(robot: Robot, wrong: WrongUnit) -> str:
         return f"the description states an inertia, but no mass, of {links}"
     units = " or ".join((wrong.unit, *wrong.others))
     return (
-        f"the {wrong.quantity} of {links} in the description is in {units} instead of "
+        f"the {wrong.quantity} of {links} in the description seems to be in {units} instead of "
         f"{SI[wrong.quantity]}"
     )
 
@@ -155,7 +187,7 @@ def _evidence(robot: Robot, wrong: WrongUnit) -> str:
     if wrong.quantity == "mass":
         states = f"{name} would have {shape.mass[k]:.4g} kg"
         if not np.isfinite(wrong.size):
-            return f"{states}, and all torques are a thousandth of those of such bodies"
+            return f"{states}, of which the measured torque shows a thousandth"
         if wrong.size < HEAVIEST:
             rest = float(shape.mass.sum() - shape.mass[k])
             return f"{states}, and all other links {rest:.3g} kg"

@@ -37,7 +37,7 @@ LIGHT = 1e-3
 #: radius of a ball of this density and of the length of the link (within a factor of 1.5).
 USUAL_DENSITY, USUAL_RADIUS = 500.0, 0.66
 #: Logarithm of the ratio of a value to a usual one up to which a unit is likely.
-LIKELY = np.log(10**0.75)
+LIKELY = np.log(10.0)
 #: Usual size of a link of which none is known, in reaches of the robot.
 SIZE = 0.2
 #: Length of the longest single link, m, that is told from a length in millimetres without others.
