@@ -111,8 +111,11 @@ def _readings(robot: Robot, found: list[WrongUnit]) -> Iterator[list[WrongUnit]]
     Where lengths or inertias are in another unit, too, the density of links is hardly known.
     """
     bodies = dict.fromkeys(tuple(wrong.bodies) for wrong in found if wrong.quantity != "mass")
-    heavy = [_grams(robot, own) for own in bodies]
-    beside = [[w, *wrong_units(mended(robot, [w]))] for w in heavy]
+    beside = []
+    for heavy in (_grams(robot, own) for own in bodies):
+        lighter = mended(robot, [heavy])
+        if shape_of(lighter).matters[heavy.bodies].any():
+            beside.append([heavy, *wrong_units(lighter)])
     for every in (found, *(own for own in beside if sum(w.quantity == "mass" for w in own) < 2)):
         for units in product(*((wrong.unit, *wrong.others) for wrong in every)):
             yield [

@@ -22,6 +22,9 @@ from skidyn.robots import Robot
 #: Least distance of a center of mass from its joint that is in another unit, in reaches of the
 #: robot; that of real links is at most 0.8.
 CENTER_REACHES = 5.0
+#: The same of most links at once, in halves of their sizes, where one is farther than the reach;
+#: that of real robots is at most 2.1.
+CENTER_SIZES = 10.0
 #: Least radius of gyration of an inertia in another unit, in reaches of the robot and in usual
 #: radii of a link of its mass and length; those of real links are at most 1.3 and 35.
 RADIUS_REACHES, RADIUS_USUAL = 3.0, 100.0
@@ -229,8 +232,13 @@ def _centers(shape: Shape) -> WrongUnit | None:
     possible = np.where(radius < RADIUS_REACHES * shape.reach, radius, 0.0)
     own = np.maximum(possible, shape.length)
     own = np.where(own > 0, own, SIZE * shape.reach)
-    out = shape.matters & (far > CENTER_REACHES * shape.reach)
-    return _told("center of mass", shape, out, far, 2 * far / own)
+    ratio = 2 * far / own
+    out = far > CENTER_REACHES * shape.reach
+    counted = ratio[shape.matters & (far > 0)]
+    beyond = bool(np.any(far[shape.matters] > shape.reach))
+    if beyond and len(counted) > 1 and np.median(counted) > CENTER_SIZES:
+        out |= ratio > CENTER_SIZES
+    return _told("center of mass", shape, shape.matters & out, far, ratio)
 
 
 def _masses(shape: Shape) -> WrongUnit | None:
