@@ -35,6 +35,7 @@ from skidyn.measurement._clock import (
 from skidyn.measurement._commanded import CommandedMotion
 from skidyn.measurement._copies import CopiedTorque, RepeatedRecordings
 from skidyn.measurement._crosstalk import Crosstalk
+from skidyn.measurement._description import DescriptionUnits
 from skidyn.measurement._differential import MotorsOfDifferential
 from skidyn.measurement._divided import DividedRecordings
 from skidyn.measurement._elapsed import LostRows
@@ -54,10 +55,11 @@ from skidyn.measurement._torque_delay import TorqueDelay
 from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
 from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDelay
 
-TARED, UNSIGNED = TaredTorque(), UnsignedTorque()
+UNSIGNED = UnsignedTorque()
 #: The only list of checks in skidyn.
 CHECKS: tuple[Check, ...] = (
     FailedReads(),
+    DescriptionUnits(),
     LostRows(),
     ClockUnit(),
     PositionUnit(),
@@ -72,7 +74,7 @@ CHECKS: tuple[Check, ...] = (
     ClockJitter(),
     InterpolatedRows(),
     MissingTorque(),
-    TARED,
+    TaredTorque(),
     DeadBand(),
     UNSIGNED,
     OverflowedTorque(),
@@ -168,9 +170,9 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
         measurement.dead |= check.name == "dead_band" and doubted
         measurement.scaled |= check.name == "torque_scale" and doubted
         measurement.smoothed |= check.name == "smoothed_torque" and doubted
-        if check in _UNITS and any(s.certainty == "certain" for s in told):
+        if isinstance(check, _UNITS) and any(s.certainty == "certain" for s in told):
             misread = 1
-        elif check in _SCALES and any(s.certainty == "suspected" for s in told):
+        elif isinstance(check, _SCALES) and any(s.certainty == "suspected" for s in told):
             misread = 1
         elif (check.stage == 1 or check is UNSIGNED) and any(s.certainty != "noted" for s in told):
             misread = min(misread, 2)
@@ -180,8 +182,8 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
 
 #: Checks whose certain suspicions make every fit of the robot meaningless, and checks of which any
 #: suspicion does.
-_UNITS = CHECKS[1:6]
-_SCALES = (*CHECKS[2:4], TARED)
+_UNITS = (LostRows, ClockUnit, PositionUnit, Velocity, WrappedPosition)
+_SCALES = (ClockUnit, PositionUnit, TaredTorque)
 
 
 def names_in_doubt(found: list[Suspicion]) -> list[str]:
