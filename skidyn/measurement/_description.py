@@ -50,6 +50,8 @@ class DescriptionUnits(Check):
         if robot is None or not found:
             return
         found, told = _decided(measurement, robot, found)
+        if not found:
+            return
         certain = bool(told) and not measurement.identified
         certainty: Certainty = "certain" if certain else "suspected"
         for wrong in found:
@@ -68,17 +70,22 @@ def _decided(
 ) -> tuple[list[WrongUnit], str]:
     """The likely units that explain the torque best, and its evidence; empty if it has none.
 
+    None are wrong if the torque has the scale of the stated bodies and no other explains it better.
     Other checks have not yet looked at the log, so its rows are not kept.
     """
     fits = Measurement(measurement.signals, measurement.torque, robot, measurement.joint_names).fits
     if fits is None or not any(fits.usable(k) for k in range(fits.n_joints)):
         return found, ""
     fits = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
-    tried = [(own, _gain(fits, mended(robot, own))) for own in _readings(robot, found)]
-    best = max(gain for _, gain in tried)
-    own, gain = next((own, gain) for own, gain in tried if gain >= best - LEAST)
-    rivals = {tuple(w.unit for w in other) for other, gain in tried if gain >= best - LEAST}
-    if gain > SURE and len(rivals) == 1:
+    tried = [(own, _gain(fits, mended(robot, own))) for own in _readings(found)]
+    heavier = [(own, _gain(fits, mended(robot, own))) for own in _with_masses(robot, found)]
+    most = max(gain for _, gain in tried)
+    if max((gain for _, gain in heavier), default=-np.inf) > most + SURE:
+        tried = heavier
+        most = max(gain for _, gain in tried)
+    tried = [(own, gain) for own, gain in tried if gain >= most - LEAST]
+    own, gain = tried[0]
+    if gain > SURE and len(tried) == 1:
         own = [replace(wrong, others=()) for wrong in own]
     own = _with_grams(fits, robot, own)
     right = f"; with {'SI units' if len(own) > 1 else 'the right unit'}, "
@@ -88,6 +95,8 @@ def _decided(
             f"{right}the rigid-body torque explains the measured torque better by {gain:.0f} "
             "(log-likelihood)"
         )
+    if gain < LEAST and _usual(before) and not _usual(after):
+        return [], ""
     if gain > -LEAST and _usual(after) and not _usual(before):
         return own, f"{right}the torque is {after:.2g} times that of the bodies, not {before:.2g}"
     return own, ""
@@ -105,25 +114,30 @@ def _usual(multiple: float) -> bool:
     return bool(abs(np.log(multiple)) < np.log(USUAL))
 
 
-def _readings(robot: Robot, found: list[WrongUnit]) -> Iterator[list[WrongUnit]]:
-    """What was found in all likely units, the likeliest first, and then with masses in grams.
+def _readings(found: list[WrongUnit]) -> Iterator[list[WrongUnit]]:
+    """The same quantities in all likely units, the likeliest first."""
+    for units in product(*((wrong.unit, *wrong.others) for wrong in found)):
+        yield [
+            wrong
+            if unit == wrong.unit
+            else replace(wrong, unit=unit, factor=UNITS[wrong.quantity][unit], others=())
+            for wrong, unit in zip(found, units, strict=True)
+        ]
+
+
+def _with_masses(robot: Robot, found: list[WrongUnit]) -> Iterator[list[WrongUnit]]:
+    """The same with the masses of these links in grams, and what is then in another unit.
 
     Where lengths or inertias are in another unit, too, the density of links is hardly known.
     """
-    bodies = dict.fromkeys(tuple(wrong.bodies) for wrong in found if wrong.quantity != "mass")
-    beside = []
-    for heavy in (_grams(robot, own) for own in bodies):
+    for bodies in dict.fromkeys(tuple(w.bodies) for w in found if w.quantity != "mass"):
+        heavy = _grams(robot, bodies)
         lighter = mended(robot, [heavy])
-        if shape_of(lighter).matters[heavy.bodies].any():
-            beside.append([heavy, *wrong_units(lighter)])
-    for every in (found, *(own for own in beside if sum(w.quantity == "mass" for w in own) < 2)):
-        for units in product(*((wrong.unit, *wrong.others) for wrong in every)):
-            yield [
-                wrong
-                if unit == wrong.unit
-                else replace(wrong, unit=unit, factor=UNITS[wrong.quantity][unit], others=())
-                for wrong, unit in zip(every, units, strict=True)
-            ]
+        beside = wrong_units(lighter)
+        if not shape_of(lighter).matters[heavy.bodies].any():
+            continue  # it would be a placeholder
+        if not any(wrong.quantity == "mass" for wrong in beside):
+            yield from _readings([heavy, *beside])
 
 
 def _grams(robot: Robot, bodies: Sequence[int]) -> WrongUnit:

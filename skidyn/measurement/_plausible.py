@@ -4,7 +4,8 @@
 Every bound follows from the description itself: the lengths between joints, to which a center of
 mass or a radius of gyration in another unit is out of proportion, and the density of matter, beyond
 which a mass in grams is. Units differ by a factor of 100 or more, so the bounds are far from what
-links have: the largest values below are those of 84 descriptions of real and invented robots.
+links have. The largest values below are those of 84 descriptions: of example-robot-data 6.0, of
+this package, of public recordings, and of generated robots.
 """
 
 from __future__ import annotations

@@ -86,6 +86,11 @@ def test_a_log_that_tells_nothing_leaves_it_suspected(log, told):
     assert one.certainty == "suspected"
 
 
+def test_a_torque_of_the_stated_bodies_confirms_them(log, told):
+    heavy = log.assign(**{name: 1e3 * log[name] for name in TORQUES})
+    assert told(arm("4000 3000 2000", inertias="100 50 10"), heavy) == ([], [])
+
+
 def test_a_correct_gain_is_still_found(log, told):
     scaled = log.assign(**{name: 0.05 * log[name] for name in TORQUES})
     (one,), others = told(arm(centers="200 200 100"), scaled)
