@@ -21,7 +21,7 @@ from skidyn.measurement._suspicion import Suspicion
 #: share of the spread of the channel, against rounding errors beside zero.
 MOST_ROWS, AWAY, BEYOND, LARGE = 5, 3.0, 3.0, 0.01
 #: Fewest such places with one value in a channel, in all channels, and in all channels to be
-#: certain. In none of 359 logs without failed reads, 31 of them recordings, a value has two.
+#: certain. In none of 643 logs without failed reads, 31 of them recordings, a value has two.
 FEWEST, FEWEST_OF_ALL, SURE = 2, 3, 10
 #: Least share of the short runs of a value far from those before and after, and of all places to
 #: which its channel jumps and from which it returns, that are such places.
