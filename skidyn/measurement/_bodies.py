@@ -156,7 +156,8 @@ class TorqueScale(Check):
         gains = {k: float(g) for k, g in enumerate(here) if np.isfinite(g) and g > 0}
         values = np.array(list(gains.values()))
         sure = np.array(list(known.values()))
-        rate = _other_rate(fits.loaded(), bool(odd))
+        # accelerations of held positions are too small
+        rate = None if measurement.stale else _other_rate(fits.loaded(), bool(odd))
         if rate is not None:
             value = float(f"{rate:.4g}")
             words = f"time={1 / value:.6g},dq={value:g}"

@@ -40,7 +40,13 @@ from skidyn.measurement._differential import MotorsOfDifferential
 from skidyn.measurement._divided import DividedRecordings
 from skidyn.measurement._elapsed import LostRows
 from skidyn.measurement._failed_reads import FailedReads
-from skidyn.measurement._held import HeldPosition, HeldTorque, MissingTorque, StuckTorque
+from skidyn.measurement._held import (
+    HeldPosition,
+    HeldTorque,
+    HeldVelocity,
+    MissingTorque,
+    StuckTorque,
+)
 from skidyn.measurement._joint_gravity import JointGravity
 from skidyn.measurement._lengths import Lengths
 from skidyn.measurement._measurement import Measurement
@@ -87,6 +93,7 @@ CHECKS: tuple[Check, ...] = (
     NoFriction(),
     UnexplainedTorque(),
     Bodies(),
+    HeldVelocity(),
     VelocityDelay(),
     Acceleration(),
     HeldTorque(),

@@ -10,15 +10,12 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import MANY_MISSING, is_held, position_step
+from skidyn.measurement._measures import CATCHES, MANY_MISSING, RECURS, is_held, position_step
 from skidyn.measurement._placeholder import placeholder_remedy
 from skidyn.measurement._suspicion import Suspicion
 
 #: Least share of rows with the torque of the previous row, for a torque that is not coarse.
 HELD = 0.3
-#: Steps of a sensor by which a value that was held changes at least, and new values among those
-#: that follow a change.
-STEPS, RECURS = 3.0, 0.5
 #: Least length of a stuck part in rows, and as a multiple of the longest other part of one value;
 #: most stuck parts of a joint; least motion in it, as a share of the range of the joint.
 LONG, LONGER, MOST_STUCK, STUCK_WAY = 40, 5, 8, 0.1
@@ -73,9 +70,42 @@ def _comes_in_steps(values: Array) -> bool:
     changes = np.abs(np.diff(values))
     changes = changes[changes > 0]
     step = position_step(values)
-    if np.isfinite(step) and np.median(changes) < STEPS * step:
+    if np.isfinite(step) and np.median(changes) < CATCHES * step:
         return True
     return len(np.unique(values)) < RECURS * len(changes)
+
+
+class HeldVelocity(Check):
+    """Velocities of joints that hold their last value while the joints move on."""
+
+    name = "held_velocity"
+    suspects = "velocities that hold their last value: reported less often than the positions"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        if measurement.stale:
+            return  # reported already
+        s = measurement.signals
+        together = s.trajectory[1:] == s.trajectory[:-1]
+        shares = {}
+        for k in range(s.n_joints):
+            q, dq = s.q[:, k], s.dq[:, k]
+            moved = together & (q[1:] != q[:-1])
+            if not measurement.excited[k] or moved.sum() < 50 or _comes_in_steps(dq):
+                continue
+            share = float(np.mean(dq[1:][moved] == dq[:-1][moved]))
+            if share > HELD:
+                shares[k] = share
+        if shares:
+            names = ", ".join(map(measurement.joint, shares))
+            columns = [f"dq{k + 1}" for k in shares]
+            yield self.suspicion(
+                f"the velocity of {names} holds its last value",
+                f"in {100 * max(shares.values()):.0f} % of the rows in which the position changes: "
+                "it is reported less often",
+                "suspected",
+                list(shares),
+                (f"--derive {','.join(columns)}", f"derive={columns}"),
+            )
 
 
 class StuckTorque(Check):

@@ -13,6 +13,8 @@ COARSE = 0.9 * 2 * np.pi / 2**13
 STRIDE = 10
 #: Least change, in steps of the sensor, of a position that was held for several rows.
 CATCHES = 3.0
+#: Values among those that follow a change from which most are new, and not those of a few steps.
+RECURS = 0.5
 #: Windows over which velocity is compared with differentiated position, s.
 WINDOW = 0.05
 #: Correlation from which velocity is proportional to the rate of the position, the share of the
@@ -140,6 +142,8 @@ def held_share(position: np.ndarray, within: np.ndarray, step: float) -> float:
         return 0.0
     if np.isfinite(step) and np.median(jumps) < CATCHES * step:
         return 0.0
+    if np.isnan(step) and len(np.unique(position)) < RECURS * len(jumps):
+        return 0.0  # few values that recur, of which no step can be told
     return float(np.mean(moved[moves] == 0))
 
 

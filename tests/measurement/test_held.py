@@ -80,3 +80,16 @@ def test_a_torque_of_a_slow_bus_in_fine_steps(signals, torque, found):
     slow[:, 1] = slow[np.arange(len(slow)) // 25 * 25, 1]
     told = {s.check: s for s in found(signals, np.round(slow, 2))}
     assert told["held_torque"].joints == (2,)
+
+
+def test_velocities_of_a_slow_bus(signals, torque, found):
+    slow = signals.dq.copy()
+    slow[:, 0] = slow[np.arange(len(slow)) // 20 * 20, 0]
+    told = {s.check: s for s in found(signals.with_(dq=slow), torque)}
+    assert told["held_velocity"].joints == (1,)
+    assert told["held_velocity"].remedy.option == "--derive dq1"
+
+
+def test_positions_of_few_digits_are_not_held(signals, torque, found):
+    told = {s.check for s in found(signals.with_(q=np.round(signals.q, 1)), torque)}
+    assert "held_position" not in told
