@@ -328,6 +328,11 @@ def _but_for_angle(change: Change, zero: Change) -> bool:
     return _upright(change.reading.gravity) and change.untuned > zero.untuned - TIED
 
 
+def is_oblique(gravity: Sequence[float] | None) -> bool:
+    """Whether there is gravity, but not along an axis of the base."""
+    return gravity is not None and bool(np.any(gravity)) and not _upright(gravity)
+
+
 def _upright(gravity: Sequence[float] | None) -> bool:
     """Whether gravity is along an axis of the base."""
     return gravity is not None and float(np.max(np.abs(gravity))) > UPRIGHT * GRAVITY

@@ -14,7 +14,7 @@ from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._fits import Fits, Reading, friction
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
-from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes
+from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes, is_oblique
 from skidyn.measurement._robust import fit_admissible
 from skidyn.measurement._suspicion import Certainty, Suspicion
 
@@ -190,7 +190,14 @@ class Columns(Check):
                 if kind != orders[0].kind:
                     continue  # one order after another is one order of each quantity
                 alike = orders
-            yield _one_of_two(self._told(measurement, kind, alike, changes[-1].reading), alike)
+            told = self._told(measurement, kind, alike, changes[-1].reading)
+            if alike[0].kind in GRAVITIES and (
+                len(alike) < len(changes) or is_oblique(alike[0].reading.gravity)
+            ):
+                # beside other changes, or for a frame that is turned in the description, gravity
+                # may be what balances them
+                told = replace(told, certainty="suspected")
+            yield _one_of_two(told, alike)
 
     def _told(
         self, measurement: Measurement, kind: str, changes: list[Change], final: Reading
@@ -259,6 +266,8 @@ class Columns(Check):
         return self.suspicion(what, evidence, certainty, joints, remedy)
 
 
+#: Kinds of changes of gravity.
+GRAVITIES = ("gravity", "no_gravity")
 #: Kinds of changes that exchange columns.
 ORDERS = ("order", "motion_order", "torque_order")
 
