@@ -32,7 +32,8 @@ EXPLAINED = 0.5
 USUAL = (0.4, 2.5)
 #: Multiples that are attributed to wrong masses unless the other joints contradict.
 CLEARLY = (0.62, 1.6)
-#: Multiple below which little of the torque of the bodies is left, as after a model was subtracted.
+#: Share of the stated bodies in a torque, at the scale that fits best, below which little of them
+#: is left, as after a model was subtracted.
 SUBTRACTED = 0.3
 #: Multiples of an effort limit, and of the torque of the bodies, that only another unit reaches.
 FAR = 20.0
@@ -207,12 +208,17 @@ class TorqueScale(Check):
                 sorted(gains),
             )
             return
-        little = ", or the torque of a model was subtracted" * (typical < SUBTRACTED)
+        seen = explained(measurement)
+        left = 1.0 if seen is None else float(np.median(seen.shares[0]))
+        what, little = "torques look like motor currents, motor torques or another unit", ""
+        if left < SUBTRACTED:
+            what += ", or the torque of a model was subtracted from them"
+            little = f", which makes up {left:.0%} of a torque (the median of the joints)"
         yield self.suspicion(
-            f"torques look like motor currents, motor torques or another unit{little}",
-            f"they follow the rigid-body torque at a different scale ({told}). The gains below "
-            "assume the bodies of the description; if known, use the torques per ampere of the "
-            "drives instead (--drive-gains with i columns)",
+            what,
+            f"they follow the rigid-body torque at a different scale ({told}){little}. The gains "
+            "below assume the bodies of the description; if known, use the torques per ampere of "
+            "the drives instead (--drive-gains with i columns)",
             "suspected",
             sorted(gains),
             _gain_remedy(factors),

@@ -6,11 +6,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import CATCHES, MANY_MISSING, RECURS, is_held, position_step
+from skidyn.measurement._measures import (
+    CATCHES,
+    MANY_MISSING,
+    RECURS,
+    STRIDE,
+    is_held,
+    position_step,
+)
 from skidyn.measurement._placeholder import placeholder_remedy
 from skidyn.measurement._suspicion import Suspicion
 
@@ -75,6 +83,16 @@ def _comes_in_steps(values: Array) -> bool:
     return len(np.unique(values)) < RECURS * len(changes)
 
 
+def _accelerates(position: Array) -> NDArray[np.bool_]:
+    """Steps, one fewer than positions, around which the mean velocity of a joint changes."""
+    way = position[STRIDE:] - position[:-STRIDE]
+    change = np.abs(way[STRIDE:] - way[:-STRIDE])
+    found = np.zeros(len(position) - 1, dtype=bool)
+    if len(change):
+        found[np.flatnonzero(change > 0.25 * np.quantile(change, 0.9)) + STRIDE] = True
+    return found
+
+
 class HeldVelocity(Check):
     """Velocities of joints that hold their last value while the joints move on."""
 
@@ -89,7 +107,8 @@ class HeldVelocity(Check):
         shares = {}
         for k in range(s.n_joints):
             q, dq = s.q[:, k], s.dq[:, k]
-            moved = together & (q[1:] != q[:-1])
+            # the velocity of a joint at rest, or at constant speed, does not change
+            moved = together & (q[1:] != q[:-1]) & (dq[1:] != 0) & _accelerates(q)
             if not measurement.excited[k] or moved.sum() < 50 or _comes_in_steps(dq):
                 continue
             share = float(np.mean(dq[1:][moved] == dq[:-1][moved]))
@@ -100,8 +119,8 @@ class HeldVelocity(Check):
             columns = [f"dq{k + 1}" for k in shares]
             yield self.suspicion(
                 f"the velocity of {names} holds its last value",
-                f"in {100 * max(shares.values()):.0f} % of the rows in which the position changes: "
-                "it is reported less often",
+                f"in {100 * max(shares.values()):.0f} % of the rows in which the joint "
+                "accelerates: it is reported less often",
                 "suspected",
                 list(shares),
                 (f"--derive {','.join(columns)}", f"derive={columns}"),
