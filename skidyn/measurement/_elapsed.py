@@ -22,9 +22,8 @@ CLEAR = 4.0
 #: Share of moving rows backwards in time, and of rows that skip others, for a suspicion and for
 #: certainty.
 BACKWARDS, SKIPPED, SURELY = 0.1, 0.004, 0.02
-#: Moving rows from which a recording is judged by itself, and least work of its drives, as a share
-#: of all work they exchange.
-FEWEST_TURNED, LEAST_WORK = 20, 0.02
+#: Moving rows from which a recording is judged by itself.
+FEWEST_TURNED = 20
 #: Squared steps by velocities, over their mean, from which rows are fast.
 FAST = 0.25
 #: Steps of the clock from which a step is a burst of lost rows, and bursts for a suspicion and for
@@ -117,6 +116,25 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
     )
 
 
+def _friction_work(measurement: Measurement, rows: NDArray[np.bool_]) -> float:
+    """Work of the drives against dry friction along the recorded velocities.
+
+    It is positive if velocities belong to the torques. The rest of a torque is taken for a function
+    of the positions, and for that of the stated bodies.
+    """
+    s = measurement.signals.take(rows)
+    turns = np.column_stack([np.ones(s.n_samples), np.sin(s.q), np.cos(s.q)])
+    torque, work = measurement.torque[rows], 0.0
+    robot = measurement.robot
+    bodies = None if robot is None else robot.inverse_dynamics(s.q, s.dq, np.zeros_like(s.q))
+    for k in range(s.n_joints):
+        own = [] if bodies is None else [bodies[:, k]]
+        columns = np.column_stack([np.sign(s.dq[:, k]), turns, *own])
+        dry = np.linalg.lstsq(columns, torque[:, k], rcond=1e-9)[0][0]
+        work += float(dry * np.sum(np.abs(s.dq[:, k])))
+    return work
+
+
 def _turned_trajectories(
     measurement: Measurement, found: Elapsed, backwards: NDArray[np.bool_]
 ) -> list[int]:
@@ -206,17 +224,13 @@ class LostRows(Check):
 
     def _turned(self, measurement: Measurement, turned: list[int]) -> Iterator[Suspicion]:
         """Recordings in reversed order, unless their torque agrees with the positions instead."""
-        own = np.isin(measurement.recorded.trajectory, turned)
-        power = np.sum(measurement.torque[own] * measurement.signals.dq[own], axis=1)
-        # over a recording, drives do work: friction takes energy in both directions
-        if power.sum() < LEAST_WORK * np.abs(power).sum():
-            return
+        if _friction_work(measurement, np.isin(measurement.recorded.trajectory, turned)) < 0:
+            return  # then velocities have the wrong sign
         measurement.lost = True
         yield self.suspicion(
             f"the rows of trajectories {', '.join(map(str, turned))} are in reversed order of time",
             "in nearly all their moving rows all joints move against their velocities at once, "
-            "although torques do work along these velocities; reverse the rows of these "
-            "recordings",
+            "although friction opposes these velocities; reverse the rows of these recordings",
             "certain",
         )
 

@@ -74,9 +74,11 @@ class HeldTorque(Check):
 
 
 def _comes_in_steps(values: Array) -> bool:
-    """Whether values stay equal because the sensor is coarse: few ones recur, one step apart."""
+    """Whether values are constant, or those of a coarse sensor: few ones recur, one step apart."""
     changes = np.abs(np.diff(values))
     changes = changes[changes > 0]
+    if not len(changes):
+        return True
     step = position_step(values)
     if np.isfinite(step) and np.median(changes) < CATCHES * step:
         return True
@@ -110,7 +112,7 @@ class HeldVelocity(Check):
             # the velocity of a joint at rest, or at constant speed, does not change
             moved = together & (q[1:] != q[:-1]) & (dq[1:] != 0) & _accelerates(q)
             if not measurement.excited[k] or moved.sum() < 50 or _comes_in_steps(dq):
-                continue
+                continue  # a constant one, too
             share = float(np.mean(dq[1:][moved] == dq[:-1][moved]))
             if share > HELD:
                 shares[k] = share
