@@ -83,9 +83,9 @@ _not_run = [
     }.items()
     if find_spec(package) is None
 ]
-if Path(_recordings).is_dir():
+if Path(_recordings).is_dir() and not os.environ.get("SKIDYN_SMALL"):
     os.environ["SKIDYN_DATA"] = str(_recordings)
-else:
+else:  # in their small size, tests/whole/test_examples.py runs them and looks at their results
     _not_run.append("plot_real_")
 
 sphinx_gallery_conf = {

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every example of the gallery runs from the command line, in its small size.
 
-Those that ``make docs`` has just run, in their full size, are not run a second time.
+Those that the documentation build has just run are not run a second time.
 """
 
 import hashlib
@@ -32,15 +32,15 @@ def test_gallery_is_large_enough_to_show_every_part():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "script", sorted(EXAMPLES.glob("**/plot_*.py")), ids=lambda path: path.stem
+    "script",
+    sorted(set(EXAMPLES.glob("**/plot_*.py")) - set(EXAMPLES.glob("**/plot_real_*.py"))),
+    ids=lambda path: path.stem,
 )
-def test_example_runs(script, tmp_path, request):
-    """``SKIDYN_SMALL=1`` asks an example for its small size; ``plot_real_*`` need recordings."""
+def test_example_runs(script, tmp_path):
+    """``SKIDYN_SMALL=1`` asks an example for its small size; those with recordings are below."""
     if ran_in_the_documentation(script):
         pytest.skip("the documentation build has run this very file")
     environment = dict(os.environ, SKIDYN_SMALL="1", MPLBACKEND="Agg")
-    if script.stem.startswith("plot_real_"):
-        environment["SKIDYN_DATA"] = str(request.getfixturevalue("data_dir"))
     done = subprocess.run(
         [sys.executable, "-W", "error::FutureWarning", str(script)],
         cwd=tmp_path,
