@@ -324,7 +324,7 @@ _SINGLE = (
     "(split_gaps, split_dwells or several files give more trajectories)."
 )
 _MOTION_HEAD = "  position range  coverage     step   speed reversals"
-_TORQUE_HEAD = "      torque range  at limit  at rest     dq/q'  delay ms"
+_TORQUE_HEAD = "         torque range  at limit  at rest     dq/q'  delay ms"
 
 
 def _motion_cells(joint: JointQuality) -> str:
@@ -342,9 +342,14 @@ def _torque_cells(joint: JointQuality) -> str:
     weak, strong = joint.torque_range
     slope, delay = _number(joint.velocity_slope, 9), _number(1e3 * joint.torque_delay, 9, 1)
     return (
-        f" {weak:8.2f} ..{strong:7.2f} {_percent(joint.saturated_share)}"
+        f" {_torque(weak):>9} .. {_torque(strong):>8} {_percent(joint.saturated_share)}"
         f"{_percent(joint.rest_share)} {slope} {delay}"
     )
+
+
+def _torque(value: float) -> str:
+    """Two decimals, or two digits of small ones."""
+    return f"{value:.2f}" if abs(value) >= 0.1 else f"{value:.2g}"
 
 
 def _percent(share: float) -> str:
