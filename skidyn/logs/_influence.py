@@ -27,6 +27,7 @@ def by_influence(
     robot: Robot,
     checks: Sequence[Suspicion],
     measured: Callable[[pd.DataFrame, Robot], Measurement],
+    corrected: Robot | None = None,
 ) -> list[Suspicion]:
     """Suspicions with the influence of their remedies, in the order of it.
 
@@ -38,11 +39,13 @@ def by_influence(
     frame : DataFrame
         The log, as :func:`skidyn.logs.read_log` returns it.
     robot : Robot
-        Its robot.
+        Its robot according to the description.
     checks : sequence of Suspicion
         Suspicions about the log.
     measured : callable
         Makes a measurement of a log and a robot.
+    corrected : Robot, optional
+        The robot with which the checks have replaced it, whose correction has an influence as well.
 
     Returns
     -------
@@ -52,13 +55,22 @@ def by_influence(
     from skidyn.measurement import CERTAINTIES, errors_of_fits
 
     remedies = [None if told.certainty == "noted" else told.remedy for told in checks]
-    before = errors_of_fits(measured(frame, robot)) if any(remedies) else None
+    changed = corrected is not None and corrected is not robot
+    described = errors_of_fits(measured(frame, robot)) if any(remedies) or changed else None
+    if described is None:
+        return list(checks)
+    if changed and corrected is not None:
+        robot = corrected
+    before = errors_of_fits(measured(frame, robot)) if changed else described
     if before is None:
         return list(checks)
     found = []
     for told, remedy in zip(checks, remedies, strict=True):
         after = None
-        if remedy is not None:
+        if changed and told.check == "description_units":
+            share = float(np.max(1 - before / described).clip(0.0, 1.0))
+            told = replace(told, influence=share)
+        elif remedy is not None:
             try:
                 after = errors_of_fits(measured(*_mended(frame, robot, remedy)))
             except SkidynError:

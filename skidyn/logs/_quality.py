@@ -214,7 +214,9 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     measurement, n_trajectories, messages = _measured(frame, robot)
     checks = check_measurement(measurement)
     if robot is not None:
-        checks = by_influence(frame, robot, checks, lambda log, own: _measured(log, own)[0])
+        checks = by_influence(
+            frame, robot, checks, lambda log, own: _measured(log, own)[0], measurement.robot
+        )
     return LogQuality(
         n_samples=measurement.n_samples,
         n_trajectories=n_trajectories,

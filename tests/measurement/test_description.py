@@ -107,3 +107,14 @@ def test_one_link_of_a_larger_arm():
     (one,) = [s for s in checks if s.check == CHECK]
     assert one.joints == (4,)
     assert "torque_scale" not in {s.check for s in checks}
+
+
+def test_the_influence_of_remedies_is_that_with_the_right_units(log):
+    flipped = log.assign(tau2=-log["tau2"])
+    told, alone = (
+        {s.check: s for s in check_log(flipped, robot).checks if s.certainty == "certain"}
+        for robot in (arm(centers="200 200 100"), arm())
+    )
+    assert told["reading"].remedy == alone["reading"].remedy
+    assert told["reading"].influence == pytest.approx(alone["reading"].influence, rel=1e-6)
+    assert told[CHECK].influence > 0.99
