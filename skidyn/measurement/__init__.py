@@ -19,7 +19,6 @@ __all__ = [
 ]
 
 # For other packages of skidyn; no part of the public interface.
-from skidyn.measurement._arrival import rows_after_false_gaps as rows_after_false_gaps
 from skidyn.measurement._checks import names_in_doubt as names_in_doubt
 from skidyn.measurement._clock import count_same_stamps as count_same_stamps
 from skidyn.measurement._copies import copied_rows as copied_rows

@@ -42,7 +42,6 @@ def rows_after_false_gaps(time: Array, q: Array, trajectory: NDArray[np.int64]) 
     Examples
     --------
     >>> import numpy as np
-    >>> from skidyn.measurement import rows_after_false_gaps
     >>> t = np.arange(200) * 0.01
     >>> q, recording = np.sin(t)[:, None], np.zeros(200, int)
     >>> rows_after_false_gaps(t + 3 * (t > 1.0), q, recording).tolist()
@@ -50,10 +49,13 @@ def rows_after_false_gaps(time: Array, q: Array, trajectory: NDArray[np.int64]) 
     >>> rows_after_false_gaps(t[(t < 1.0) | (t > 1.5)], q[(t < 1.0) | (t > 1.5)], recording[:150])
     array([], dtype=int64)
     """
-    found = []
+    found: list[NDArray[np.intp]] = []
+    recordings = find_segments(trajectory)
+    if len(find_segments(trajectory, time)) == len(recordings) or len(q) < 3:
+        return np.zeros(0, dtype=np.intp)  # no gaps, as in most logs
     moved = np.abs(np.diff(q, axis=0))
-    scatter = np.median(np.abs(np.diff(q, 2, axis=0)), axis=0) if len(q) > 2 else np.zeros(0)
-    for rows in find_segments(trajectory):
+    scatter = np.median(np.abs(np.diff(q, 2, axis=0)), axis=0)
+    for rows in recordings:
         steps = np.diff(time[rows])
         begins = [s.start for s in find_segments(trajectory[rows], time[rows])][1:]
         gaps = np.array(begins, dtype=np.intp) - 1

@@ -2,7 +2,7 @@
 """Check of the units of masses, centers of mass and inertias in a description.
 
 No option of a log corrects them, and with such bodies every torque would seem to be in another
-unit. So this is the first check, and all others use the description with the units that it found.
+unit. So this check comes before all that fit the robot, and these use the units that it found.
 """
 
 from __future__ import annotations

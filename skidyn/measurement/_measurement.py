@@ -54,8 +54,8 @@ class Measurement:
     torque : ndarray of shape (n_samples, n_joints), N m or N
         Recorded torque.
     robot : Robot or None
-        Robot according to its description; checks that need it are left out without it. The first
-        check replaces one whose masses, lengths or inertias are in other units.
+        Robot according to its description; checks that need it are left out without it. That of
+        its units replaces one whose masses, centers of mass or inertias are in other units.
     joint_names : sequence of str
         Names for sentences and remedies.
     identified : bool, optional

@@ -16,15 +16,6 @@ FAILED = [40, 41, 200, 301, 450, 600]
 pytestmark = pytest.mark.filterwarnings("ignore::skidyn.exceptions.LogWarning")
 
 
-@pytest.fixture
-def read(tmp_path):
-    def run(frame, **options):
-        frame.to_csv(tmp_path / "log.csv", index=False)
-        return read_log(tmp_path / "log.csv", check=False, **options)
-
-    return run
-
-
 @pytest.mark.parametrize(
     "asked", [9999, [9999], {"all": 9999}, {"q": [9999.0]}, {"q2": 9999}, [9999, LOG["tau1"][7]]]
 )

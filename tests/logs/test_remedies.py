@@ -13,15 +13,6 @@ ROBOT = load_planar_arm()
 LOG = make_hidden_effect_log(ROBOT, None, n_trajectories=3, duration=4.0).frame
 
 
-@pytest.fixture
-def read(tmp_path):
-    def run(frame, **options):
-        frame.to_csv(tmp_path / "log.csv", index=False)
-        return read_log(tmp_path / "log.csv", check=False, **options)
-
-    return run
-
-
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize(
     "spoil, mend",
