@@ -51,6 +51,7 @@ from skidyn.diagnosis._rule import (
     EPISODE_LEAST_RANGE,
     GUESS,
     LITTLE,
+    MUCH,
     SURE_OF_LITTLE,
     false_discovery_rate,
 )
@@ -184,7 +185,10 @@ def conclude(
     if guess is None:
         return diagnosis
     rest = _without(problem, result, *guess)
-    return conclude(problem, rest, limits, sliding, torque, notes, least_drop, model, data)
+    without = conclude(problem, rest, limits, sliding, torque, notes, least_drop, model, data)
+    # "Nothing is missing" would be wrong: something is, and this is the most likely name.
+    only = len(result.findings) == 1 and without.verdict == "complete"
+    return diagnosis if only and max(f.error_drop for f in findings) > MUCH else without
 
 
 def _refitted(
@@ -370,7 +374,8 @@ def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:
     """The last finding with terms that are more likely wrong than right, and these terms.
 
     If an explanation on other joints is equally good, one of the two is right, and both are
-    reported. A finding that removes most of an error is kept as its best explanation; one that
+    reported. A finding that removes most of an error is kept as its best explanation, as is (in
+    :func:`conclude`) one that removes much of it where all else is noise; one that
     removes very little needs a high confidence. An effect whose times were chosen has to be
     constant within them: otherwise they only show where the error of another effect is large. One
     that another formula of another finding would explain has to be likely by itself.

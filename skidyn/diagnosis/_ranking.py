@@ -74,6 +74,7 @@ class RankingSearch(SearchState):
     def _other_forms(self, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Other forms of the best kinds, if their residual is not noise.
 
+        It is not if it is correlated, or if an unknown function of the same joints explains more.
         On the grid, the form with the best screening score need not be the one that fits best.
         Forms of a kind that explains nearly as much as the best one are tried as well.
         """
@@ -84,9 +85,20 @@ class RankingSearch(SearchState):
             if h.torque is not None or not get_effect(h.kind).forms:
                 continue
             near = h is not names[0] and h.score > NEARLY * names[0].score
-            if near or self._price(h.candidates) > self.settings.white:
+            best = max((u.score for u in ranking if self._nameless_there(u, h)), default=0.0)
+            inexact = best > h.score + self.settings.least_gain
+            if near or inexact or self._price(h.candidates) > self.settings.white:
                 found += self._in_other_forms(h)
         return self._finals(found, refined=len(found))
+
+    @staticmethod
+    def _nameless_there(function: Hypothesis, named: Hypothesis) -> bool:
+        """Whether an explanation is an unknown function of joints of another one."""
+        return (
+            function.kind == UNKNOWN
+            and not within_recordings(function)
+            and bool(set(function.joints) & set(named.joints))
+        )
 
     def _in_other_forms(self, hypothesis: Hypothesis) -> list[list[Candidate]]:
         """The terms of a hypothesis in each other form of its kind."""
@@ -245,7 +257,7 @@ class RankingSearch(SearchState):
         for split in splits:
             if split.drop.sum() > 0:
                 candidate = self._carried(split.candidate)
-                own = self._each_by_itself(candidate) if split.apart else [candidate]
+                own = self._with_own_sizes(candidate) if split.apart else [candidate]
                 found.append((own, -float(split.drop.sum()) + 2 * sum(c.width for c in own)))
         return found
 
@@ -295,12 +307,25 @@ class RankingSearch(SearchState):
         possible = partial(self.can_be, others=self.chosen)
         return course_candidates(self.problem, kinds, tester, possible, self.significant, least)
 
-    def _each_by_itself(self, candidate: Candidate) -> list[Candidate]:
-        """Effects of some recordings, with a separate size in each of them."""
-        terms = [
-            candidate.term.with_shape(trajectories=(k,)) for k in candidate.term.trajectories or ()
-        ]
-        return [replace(candidate, term=t, rows=self.problem.term_rows(t)) for t in terms]
+    def _with_own_sizes(self, candidate: Candidate) -> list[Candidate]:
+        """Effects of some recordings, with a common size for those that do not differ.
+
+        One by one, the two groups of recordings whose sizes differ least are joined, as long as the
+        penalty for separate sizes exceeds what these explain.
+        """
+
+        def of(group: tuple[int, ...]) -> Candidate:
+            term = candidate.term.with_shape(trajectories=group)
+            return replace(candidate, term=term, rows=self.problem.term_rows(term))
+
+        own = [of((k,)) for k in candidate.term.trajectories or ()]
+        while len(own) > 1:
+            gain, i, j = self.tester([*self.chosen, *own]).least_difference([c.width for c in own])
+            if gain > 2 * self._price(own) * candidate.width:
+                break
+            both = own[i].term.trajectories + own[j].term.trajectories
+            own = [c for k, c in enumerate(own) if k not in (i, j)] + [of(tuple(sorted(both)))]
+        return sorted(own, key=lambda c: c.term.trajectories or ())
 
     def _finals(self, rough: list[list[Candidate]], refined: int | None = None) -> list[Hypothesis]:
         """Compare the best kinds with re-estimated noise, the first of them with refined shapes."""

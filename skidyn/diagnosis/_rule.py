@@ -36,7 +36,7 @@ from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +71,9 @@ CONFINED = 0.8
 #: An effect with a lower confidence that removes a smaller share of the error is not a finding,
 #: unless another effect is equally good (``_conclusion.py``; ``confidence.py``).
 GUESS = 0.5
+#: The only finding, if it removes a larger share and only noise is left, is reported as the most
+#: likely effect even with a lower confidence.
+MUCH = 0.1
 #: An effect that removes a smaller share of the error of samples is a finding only with this
 #: confidence: in generated logs, such effects with a lower confidence were wrong
 #: (``confidence.py``).
@@ -460,6 +463,33 @@ class Tester:
         scaled = self._scaled(rows)
         least = self._least(scaled, *self._mimic(scaled))
         return least.coefficients, least.drop
+
+    def least_difference(self, widths: Sequence[int]) -> tuple[float, int, int]:
+        """The two of the last effects of the model whose coefficients differ least.
+
+        Parameters
+        ----------
+        widths : sequence of int
+            Equal numbers of columns of these effects, in the order in which they were added last.
+
+        Returns
+        -------
+        difference : float
+            Squared error that separate coefficients remove, in units of the remaining noise.
+        first, second : int
+            The two effects.
+        """
+        n, k = len(widths), widths[0]
+        own = slice(len(self.inverse) - n * k, None)
+        value = (self.inverse @ self._right)[own].reshape(n, k)
+        spread = self.inverse[own, own].reshape(n, k, n, k)
+        mean = sum(float(r @ r) for r in self.residual) / self._free
+        found = []
+        for i, j in combinations(range(n), 2):
+            d = value[i] - value[j]
+            variance = spread[i, :, i] + spread[j, :, j] - spread[i, :, j] - spread[j, :, i]
+            found.append((float(d @ np.linalg.lstsq(variance, d, rcond=None)[0]) / mean, i, j))
+        return min(found)
 
     def test_each(
         self, rows: dict[int, Array], significant: Callable[[float], bool]

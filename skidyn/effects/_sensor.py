@@ -92,6 +92,11 @@ class TimeDelay(Effect):
         return {j: -smooth_derivatives(smooth[:, [j]], signals, order=2)[1] for j in joints}
 
 
+#: Least share of the torque beyond the limit that a saturation removes; less is a gain of the torque
+#: that changes with it.
+LEAST_CUT = 0.3
+
+
 class Saturation(Effect):
     """The logged or delivered torque is cut off at a limit.
 
@@ -139,6 +144,9 @@ class Saturation(Effect):
             return np.asarray(-side * np.maximum(0.0, side * torque - shape["limit"]))[:, None]
         missing: Array = -np.sign(torque) * np.maximum(0.0, np.abs(torque) - shape["limit"])
         return missing[:, None]
+
+    def least(self, shape: Mapping[str, Any]) -> float:
+        return LEAST_CUT
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
