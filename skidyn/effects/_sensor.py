@@ -92,8 +92,8 @@ class TimeDelay(Effect):
         return {j: -smooth_derivatives(smooth[:, [j]], signals, order=2)[1] for j in joints}
 
 
-#: Least share of the torque beyond the limit that a saturation removes; less is a gain of the torque
-#: that changes with it.
+#: Least share of the torque beyond the limit that a saturation removes; less is a gain that changes
+#: with the torque.
 LEAST_CUT = 0.3
 
 
