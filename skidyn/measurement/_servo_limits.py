@@ -143,7 +143,6 @@ def _seen(fits: Fits, j: int) -> Servo:
     if is_limited:
         low = use & (most < below)
         half = _half(
-            own,
             hit,
             lambda kept: _Error(needed_of(low & kept), torque, speed, use & kept).least(own),
         )
@@ -153,9 +152,7 @@ def _seen(fits: Fits, j: int) -> Servo:
     return Servo(own, half, int(at.sum()), left, 1 - total, is_limited, *gain)
 
 
-def _half(
-    limit: Array, hit: NDArray[np.bool_], again: Callable[[NDArray[np.bool_]], Array]
-) -> Array:
+def _half(hit: NDArray[np.bool_], again: Callable[[NDArray[np.bool_]], Array]) -> Array:
     """Half the widths of 95 % intervals of a limit, from blocks of rows that are left out in turn.
 
     Each block has its part of the rows at the limit, which are few, and of the others.

@@ -24,12 +24,6 @@ BELOW, TURNS = 0.01, 4
 CUT = 0.05
 #: Log-likelihood that the magnitude must gain over the torque itself, and to be sure.
 LEAST, SURE = 15.0, 40.0
-#: Share of a torque's spread that the robot must explain for its multiple to be reported.
-EXPLAINED = 0.5
-#: Multiples of the robot's own torque that may be due to wrong masses.
-USUAL = (0.4, 2.5)
-#: Factors of units of torque.
-UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
 
 
 class UnsignedTorque(Check):
