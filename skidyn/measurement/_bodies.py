@@ -17,7 +17,7 @@ from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading, friction, 
 from skidyn.measurement._gains import Scales, refined_scales
 from skidyn.measurement._joint_gravity import without_gravity
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._peak import peak
+from skidyn.measurement._peak import climb, peak
 from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, MOST_ROWS
 from skidyn.measurement._robust import ROUNDS, fit_admissible
 from skidyn.measurement._size import find_size
@@ -331,13 +331,7 @@ def _other_rate(fits: Fits, odd: bool) -> float | None:
     best, log = max((_rate_gain(few, rate, 1), float(np.log(rate))) for rate in RATES)
     if best < LEAST and not odd:
         return None
-    step, best = 0.2, _rate_gain(fits, float(np.exp(log)))
-    while step > 0.01:
-        near, other = max((_rate_gain(fits, float(np.exp(x))), x) for x in (log - step, log + step))
-        if near > best:
-            best, log = near, other
-        else:
-            step /= 2
+    log, best = climb(lambda log: _rate_gain(fits, float(np.exp(log))), log, 0.2, 0.01)
     rate = float(np.exp(log))
     if best < SURE or CLEARLY[0] < rate < CLEARLY[1]:
         return None
@@ -422,17 +416,12 @@ def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
         return float(change.sum())
 
     @cache  # a search comes back to where it was
-    def at(place: int) -> float:
+    def at(place: float) -> float:
         return gained(np.log(gain) + 0.01 * place)
 
     step = 8  # maxima are narrow if the noise is small
-    best, place = max((at(x), x) for x in range(-5 * step, 6 * step, step))
-    while step:
-        near, other = max((at(x), x) for x in (place - step, place + step))
-        if near > best:
-            best, place = near, other
-        else:
-            step //= 2
+    first = max(range(-5 * step, 6 * step, step), key=lambda place: (at(place), place))
+    place, best = climb(at, first, step, 0.5)
     log = np.log(gain) + 0.01 * place
     far = max(gained(log + x) for x in (-np.log(4), np.log(4)))
     return float(np.exp(log)), best, best - far

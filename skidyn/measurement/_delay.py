@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skidyn._signals import SIGN_BLUR, Array, Signals
 from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction, lines_between
 from skidyn.measurement._loads import LOAD, by_recording, n_loads
-from skidyn.measurement._peak import peak
+from skidyn.measurement._peak import peak, vertex
 from skidyn.measurement._robust import FEWEST, RobustFit, fit_together
 from skidyn.robots import base_parameter_index
 
@@ -523,6 +523,4 @@ def _bottom(cost: Array, k: int) -> float:
     """Minimum of a parabola through a cost and its neighbours, in units of their distance."""
     if k in (0, len(cost) - 1):
         return 0.0
-    left, middle, right = cost[k - 1 : k + 2]
-    bend = left - 2 * middle + right
-    return float(0.5 * (left - right) / bend) if bend > 0 else 0.0
+    return vertex(*-cost[k - 1 : k + 2]) or 0.0

@@ -24,6 +24,7 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
 from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading, lines_between
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._peak import climb
 from skidyn.measurement._robust import fit_at_once, fit_together
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_gain
@@ -318,13 +319,8 @@ def _refined_zero(fits: Fits, tried: list[Tried]) -> Division | None:
     )
     if value < SURE:
         return None
-    step = np.deg2rad(10)
-    while step > np.deg2rad(1):
-        near, other = max((margin(k, a, out), a) for a in (angle - step, angle + step))
-        if near > value:
-            value, angle = near, other
-        else:
-            step /= 2
+    of_angle = partial(margin, k, out=out)
+    angle, value = climb(of_angle, angle, np.deg2rad(10), np.deg2rad(1))
     if abs(angle) < LEAST_ZERO:
         return None
     if 2 * len(out) > len(runs):

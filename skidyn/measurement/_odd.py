@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import repeat
 
 import numpy as np
@@ -17,6 +18,7 @@ from skidyn.measurement._duel import left_by_effects
 from skidyn.measurement._fits import SAMPLES, Fits, Reading
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd_order import find_exchanges
+from skidyn.measurement._peak import climb
 from skidyn.measurement._robust import robust_likelihood, student
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_gain
@@ -221,13 +223,8 @@ def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
     plain = likelihood(0, 0.0)
     best = (0, 0.0, plain)
     for joint in np.flatnonzero(~fits.signals.prismatic).tolist():
-        angle, value, step = 0.0, plain, np.deg2rad(30)
-        while step > np.deg2rad(1):
-            near, other = max((likelihood(joint, a), a) for a in (angle - step, angle + step))
-            if near > value:
-                value, angle = near, other
-            else:
-                step /= 2
+        of_joint = partial(likelihood, joint)
+        angle, value = climb(of_joint, 0.0, np.deg2rad(30), np.deg2rad(1))
         best = max(best, (joint, angle, value), key=lambda found: found[2])
     joint, angle, value = best
     before, after = errors(joint, 0.0), errors(joint, angle)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._duel import fight
 from skidyn.measurement._fits import Fits, Outcome, Reading, friction
-from skidyn.measurement._peak import peak
+from skidyn.measurement._peak import climb, peak
 from skidyn.robots import Robot
 
 #: Least log-likelihood gain of a change, corrected for the correlation of neighbouring rows.
@@ -364,13 +364,18 @@ def _or_bodies(fits: Fits, reading: Reading, zero: Change) -> Change | None:
 def _refined(fits: Fits, change: Change) -> Change:
     """The zero of a position at which the robot explains the torque best, near one that was tried.
 
-    By halving steps, since the likelihood has one maximum within half a step.
+    The likelihood has one maximum within half the distance of those that are tried.
     """
+    *others, (joint, angle) = change.reading.zero
 
-    def likelihood(reading: Reading) -> float:
-        return float(fits.nominal(reading, SCREENED).likelihood.sum())
+    def read(angle: float) -> Reading:
+        return replace(change.reading, zero=(*others, (joint, float(angle))))
 
-    return _climbed(change, likelihood, 22.5)
+    def likelihood(angle: float) -> float:
+        return float(fits.nominal(read(angle), SCREENED).likelihood.sum())
+
+    angle, _ = climb(likelihood, angle, np.deg2rad(22.5), np.deg2rad(0.25))
+    return replace(change, reading=read(angle))
 
 
 def _sharpened(fits: Fits, reading: Reading, joints: Sequence[int]) -> Reading:
@@ -400,24 +405,6 @@ def _with_zero(reading: Reading, joint: int, angle: float) -> Reading:
     turned = float(np.angle(np.exp(1j * angle)))
     zero = tuple((j, turned if j == joint else x) for j, x in reading.zero)
     return replace(reading, zero=zero)
-
-
-def _climbed(change: Change, likelihood: Callable[[Reading], float], degrees: float) -> Change:
-    """Angle of the last zero at the maximum of a likelihood, by halving steps."""
-    *others, (joint, angle) = change.reading.zero
-
-    def reading(angle: float) -> Reading:
-        return replace(change.reading, zero=(*others, (joint, float(angle))))
-
-    best, step = likelihood(reading(angle)), np.deg2rad(degrees)
-    while step > np.deg2rad(0.25):
-        for other in (angle - step, angle + step):
-            if (value := likelihood(reading(other))) > best:
-                angle, best = other, value
-                break
-        else:
-            step /= 2
-    return replace(change, reading=reading(angle))
 
 
 #: Share of a zero's gain that identified bodies may still gain over it on its joint.

@@ -12,6 +12,7 @@ from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._measurement import ALIKE, Measurement
+from skidyn.measurement._peak import climb
 from skidyn.measurement._readings import FEWEST_ROWS, MOST_ROWS
 from skidyn.measurement._suspicion import Suspicion
 
@@ -408,14 +409,8 @@ def _sharpened(fits: Fits, size: float, joints: frozenset[int] | None) -> float:
         outcome = fits.identified(_sized(float(np.exp(log)), joints))
         return float(np.sum(outcome.likelihood / inflation))
 
-    first = log = float(np.log(size))
-    step, best = APART, likelihood(log)
-    while step > FINEST and abs(log - first) <= NOT_FAR:  # the maximum is narrow without noise
-        near, other = max((likelihood(x), x) for x in (log - step, log + step))
-        if near > best:
-            best, log = near, other
-        else:
-            step /= 2
+    first = float(np.log(size))
+    log, best = climb(likelihood, first, APART, FINEST, NOT_FAR)
     bend = 2 * best - likelihood(log - BEND) - likelihood(log + BEND)
     if bend <= 0 or abs(log - first) > NOT_FAR:
         return size  # bodies compensate any size

@@ -15,6 +15,7 @@ from skidyn.measurement._fits import Reading
 from skidyn.measurement._lowpass import TRIED, summit, suspect_lowpass, without_lowpass
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._measures import velocity_consistency
+from skidyn.measurement._peak import vertex
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._tachometer import Fault, find_fault
 from skidyn.measurement._units import (
@@ -385,10 +386,8 @@ def _lag(signals: Signals, k: int) -> float:
         return float("nan")
     if errors[best] > 0.1 * plain:
         return float("nan")
-    left, middle, right = errors[best - 1 : best + 2]
-    bend = left - 2 * middle + right
     step = lags[1] - lags[0]
-    lag = lags[best] + step * (0.5 * (left - right) / bend if bend > 0 else 0.0)
+    lag = lags[best] + step * (vertex(*-errors[best - 1 : best + 2]) or 0.0)
     return float(lag) if errors[best] < (1 - TAKEN) * errors[len(lags) // 2] else 0.0
 
 
