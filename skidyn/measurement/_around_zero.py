@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import SAMPLES, Fits, Reading
+from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import position_step, runs_of
 from skidyn.measurement._suspicion import Suspicion
@@ -145,7 +145,7 @@ def _felt(fits: Fits, joint: int) -> bool:
     pull = np.tensordot(fits.robot.gravity, pulls, 1)
     _, speed, sign, _ = fits.columns(Reading()).transpose(1, 0, 2)
     table = np.column_stack([torque, *(x[:, joint] for x in (pull, still, speed, sign))])[counts]
-    runs = fits.signals.trajectory[::SAMPLES][counts]
+    runs = fits.recording[counts]
     for run in np.unique(runs):
         table[runs == run] -= table[runs == run].mean(axis=0)
     if table[:, 1].std() < HEAVY * torque.std():

@@ -86,7 +86,7 @@ class Axes(Check):
         ):
             return
         gains = np.nan_to_num(found.fits.nominal(Reading()).gain)
-        inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+        inflation = fits.identified(Reading()).inflation
         here, there = (NearBodies(f, Reading(), gains, inflation) for f in (fits, found.fits))
         duel = duel_of(here, there, range(fits.n_joints))
         if duel.beside < (LEAST if found.confirmed > CONFIRMED else max(LEAST, BESIDE * duel.gain)):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._crosstalk import find_shares
-from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading, friction, lines_between
+from skidyn.measurement._fits import Fits, Outcome, Reading, friction, lines_between
 from skidyn.measurement._gains import Scales, refined_scales
 from skidyn.measurement._joint_gravity import without_gravity
 from skidyn.measurement._measurement import Measurement
@@ -412,7 +412,7 @@ def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
         other = fits.scaled({k: float(np.exp(log))}).identified(Reading())
         # the density of a torque is that of the scaled torque divided by the gain
         change = other.margin(plain)
-        change[k] -= rows * log / max(other.inflation_of(k), 1.0)
+        change[k] -= rows * log / other.inflation_of(k)
         return float(change.sum())
 
     @cache  # a search comes back to where it was
@@ -525,7 +525,7 @@ def _held_out(seen: Explained) -> Array:
     The share is 1 if a constant, the median of the torque, would have the same error.
     """
     fits = seen.fits
-    number = fits.signals.trajectory[::SAMPLES]
+    number = fits.recording
     if len(np.unique(number)) < FEWEST_PARTS:
         number = np.arange(fits.n_rows) * FEWEST_PARTS // fits.n_rows
     parts = [np.isin(number, own) for own in np.array_split(np.unique(number), FEWEST_PARTS)]
@@ -546,7 +546,7 @@ def _left_by_position(seen: Explained, k: int) -> float:
     """
     residual, use = seen.identified.residual[k], seen.fits.moving[:, k]
     q = seen.fits.average(seen.fits.signals.q[:, k])[use]
-    part = seen.fits.signals.trajectory[::SAMPLES][use]
+    part = seen.fits.recording[use]
     if len(np.unique(part)) < FEWEST_PARTS:
         part = np.arange(len(q)) * FEWEST_PARTS // len(q)
     hats = lines_between(q)

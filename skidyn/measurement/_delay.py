@@ -14,7 +14,7 @@ from skidyn._signals import SIGN_BLUR, Array, Signals
 from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction, lines_between
 from skidyn.measurement._loads import LOAD, by_recording, n_loads
 from skidyn.measurement._peak import peak, vertex
-from skidyn.measurement._robust import FEWEST, RobustFit, fit_together
+from skidyn.measurement._robust import FEWEST, RobustFit, fit_together, gains_of
 from skidyn.robots import base_parameter_index
 
 #: Lags that are tried, s, and those if the best is beyond them; number of groups of rows that are
@@ -162,7 +162,7 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
     tables, firsts, lags = [], [], np.full(n, np.nan)
     squares: dict[int, list[Array]] = {}
     counts: dict[int, int] = {}
-    run_of = s.trajectory[::SAMPLES]
+    run_of = fits.recording
     first = _first_half(fits)
     for j in range(n):
         use = _sliding(fits, s, j)
@@ -228,7 +228,9 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
     return found, beyond, runs_beyond
 
 
-def _run_costs(basis: Array, torque: Array, run_of: Array) -> Iterator[tuple[int, Array]]:
+def _run_costs(
+    basis: Array, torque: Array, run_of: NDArray[np.int64]
+) -> Iterator[tuple[int, Array]]:
     """Half the squared residual of every recording over noise, by lag, with the bodies of others.
 
     These are fitted at the lag at which they explain the other recordings best.
@@ -320,7 +322,7 @@ class JointFit:
         self.base = base_parameter_index(fits.robot)
         last = 10 * fits.robot.n_bodies + LOAD if fits.loads else LOAD[:0]
         regressor = fits.mean_regressor(fits.robot, s, np.append(self.base, last))
-        self.number = s.trajectory[::SAMPLES] if fits.loads else s.trajectory[::SAMPLES] * 0
+        self.number = fits.recording if fits.loads else 0 * fits.recording
         self.joints: list[int] = []
         self.designs: list[Array] = []
         self.places: list[NDArray[np.int64]] = []
@@ -439,16 +441,12 @@ def lag_gain(fits: Fits, lag: float, late: Sequence[int]) -> float:
         Joints, from 0.
     """
     together = JointFit(fits, late)
-    here, there = together.fit(fits.torque), together.fit(fits.torque_at(lag))
-    return sum(
-        (after.likelihood - before.likelihood) / max(after.inflation, 1.0)
-        for before, after in zip(here, there, strict=True)
-    )
+    return sum(gains_of(together.fit(fits.torque), together.fit(fits.torque_at(lag))))
 
 
 def _first_half(fits: Fits) -> NDArray[np.bool_]:
     """Rows in the first half of their recording."""
-    time, number = fits.average(fits.signals.clock), fits.signals.trajectory[::SAMPLES]
+    time, number = fits.average(fits.signals.clock), fits.recording
     first = np.zeros(fits.n_rows, dtype=bool)
     for run in np.unique(number):
         rows = number == run

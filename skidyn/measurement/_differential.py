@@ -121,7 +121,7 @@ def find_differential(fits: Fits) -> Differential | None:
     for share in SHARES:
         there = fitted(share * mixed).identified(Reading())
         # the density of two torques is that of their combinations times the determinant
-        spread = 0.5 * rows * np.log(2 * share**2) / max(*(there.inflation_of(k) for k in pair), 1)
+        spread = 0.5 * rows * np.log(2 * share**2) / max(there.inflation_of(k) for k in pair)
         judged.append((float(there.margin(here).sum() + spread), share))
     gain = max(judged)[0]
     if gain < SURE:
@@ -157,7 +157,7 @@ def _of_pair(fits: Fits, pair: tuple[int, int]) -> tuple[float, Array, Array]:
 
     plain, signs, _ = best(("own", "other"), ("other", "own"))
     mixed, factors, inflation = best(("sum", "difference"), ("difference", "sum"))
-    return (mixed - plain) / max(inflation, 1.0), factors, signs
+    return (mixed - plain) / inflation, factors, signs
 
 
 def _sum(row: Array, columns: list[str]) -> str:

@@ -69,7 +69,7 @@ def fight(fits: Fits, before: Reading, reading: Reading, joints: Sequence[int]) 
     """
     # both have the scale of the torque that the reading implies
     gains = np.nan_to_num(fits.nominal(reading).gain)
-    inflation = np.maximum(fits.identified(before).inflation, 1.0)
+    inflation = fits.identified(before).inflation
     here, there = (NearBodies(fits, r, gains, inflation) for r in (before, reading))
     return duel_of(here, there, joints)
 
@@ -128,7 +128,7 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[fl
     """
     reading = Reading()
     gains = np.nan_to_num(fits.nominal(reading).gain)
-    here = NearBodies(fits, reading, gains, np.maximum(fits.identified(reading).inflation, 1.0))
+    here = NearBodies(fits, reading, gains, fits.identified(reading).inflation)
     k = here.joints.index(joint)
     own = rows[here.rows[k]]
     effects = [*_likely(here, [joint]), *_likely(here, [joint], rows)]

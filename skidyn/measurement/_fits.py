@@ -113,7 +113,7 @@ class Outcome:
         """
         change = self.likelihood - other.likelihood
         for column, gained in enumerate(change > 0):
-            change[column] /= max((self if gained else other).inflation_of(column), 1.0)
+            change[column] /= (self if gained else other).inflation_of(column)
         return np.asarray(change)
 
     def inflation_of(self, column: int) -> float:
@@ -260,6 +260,11 @@ class Fits:
         """Number of rows."""
         return len(self.moving)
 
+    @property
+    def recording(self) -> NDArray[np.int64]:
+        """Number of the recording of every row."""
+        return self.signals.trajectory[::SAMPLES]
+
     def average(self, values: Array) -> Array:
         """Mean of every row, from values at every sample."""
         rows = values.reshape(-1, SAMPLES, *values.shape[1:])
@@ -376,8 +381,7 @@ class Fits:
                 del self._carried[next(iter(self._carried))]
             robot, s = self._robot(motion), self.motion(motion)
             felt = self.mean_regressor(robot, s, 10 * robot.n_bodies + LOAD, samples)
-            number = s.trajectory[::SAMPLES]
-            every = by_recording(felt.reshape(self.n_rows, -1), number)
+            every = by_recording(felt.reshape(self.n_rows, -1), self.recording)
             self._carried[key] = every.reshape(self.n_rows, -1, *felt.shape[1:])
         carried = self._carried[key]
         own, y = own.copy(), y.copy()
@@ -586,13 +590,13 @@ class Fits:
             base, rubs = base_parameter_index(robot), self._unstretched(motion, s)
             last = 10 * robot.n_bodies + LOAD if self.loads else LOAD[:0]
             regressor = self.mean_regressor(robot, s, np.append(base, last))
-            number, found = s.trajectory[::SAMPLES], []
+            found = []
             first = len(base) + OWN * self.n_joints
             for j in range(self.n_joints):
                 felt = np.flatnonzero(regressor[:, j, : len(base)].any(axis=0))  # moved bodies
                 columns = np.hstack([regressor[:, j][:, felt], self._own_columns(rubs, j)])
                 place = np.append(felt, len(base) + OWN * j + np.arange(OWN))
-                carried = by_recording(regressor[:, j, len(base) :], number)
+                carried = by_recording(regressor[:, j, len(base) :], self.recording)
                 if carried.size and regressor[:, j, len(base) :].any():
                     columns = np.hstack([columns, carried])
                     place = np.append(place, first + np.arange(carried.shape[1]))

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import SAMPLES, Fits, Reading
-from skidyn.measurement._loads import FEW_RUNS, MOST_RUNS
+from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._loads import by_recording
 from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies, likely_load
 
 #: Most steps, the largest one, and the one that ends them.
@@ -81,7 +81,7 @@ def refined_scales(fits: Fits, gains: Mapping[int, float], free: Mapping[int, fl
         of ``gains``.
     """
     fits = fits.with_loads(False)  # which are columns of their own here
-    inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+    inflation = fits.identified(Reading()).inflation
     now = np.ones(fits.n_joints)
     for k, gain in {**gains, **free}.items():
         now[k] = gain
@@ -89,7 +89,8 @@ def refined_scales(fits: Fits, gains: Mapping[int, float], free: Mapping[int, fl
     near = NearBodies(fits, Reading(), np.ones(fits.n_joints), inflation)
     torques = [fits.mean_torque(k)[0][use] for k, use in zip(near.joints, near.rows, strict=True)]
     stated = [y - target for y, target in zip(torques, near.targets, strict=True)]
-    loads, n_loads = _loads(fits, near)
+    loads = _loads(fits, near)
+    n_loads = loads[near.joints[0]].shape[1] if near.joints else 0
     precision = np.append(np.ones(n_loads), np.full(len(joints), KNOWN_TO**-2))
     errors = np.full(len(joints), KNOWN_TO)
     for _ in range(STEPS if joints else 0):
@@ -132,21 +133,15 @@ def _middle(values: Array, weights: Array) -> float:
     return float(values[order][np.searchsorted(share, 0.5)])
 
 
-def _loads(fits: Fits, near: NearBodies) -> tuple[dict[int, Array], int]:
+def _loads(fits: Fits, near: NearBodies) -> dict[int, Array]:
     """Columns of a load on the last body that differs from recording to recording, by joint.
 
     A payload of one recording would otherwise be scales of the joints that carry it.
     """
-    run_of = fits.signals.trajectory[::SAMPLES]
-    runs = np.unique(run_of)
-    runs = runs[1:] if FEW_RUNS < len(runs) <= MOST_RUNS else runs[:0]
-    if not len(runs):
-        return {j: np.zeros((fits.n_rows, 0)) for j in near.joints}, 0
     size = likely_load(fits.robot)
     last = np.arange(near.n_bodies - len(size), near.n_bodies)
     load = fits.mean_regressor(fits.robot, fits.motion(Reading()), last) * size
-    columns = np.concatenate([load * (run_of == run)[:, None, None] for run in runs], axis=2)
-    return {j: columns[:, j] for j in near.joints}, columns.shape[2]
+    return {j: by_recording(load[:, j], fits.recording) for j in near.joints}
 
 
 def _rounded(factor: float, error: float) -> float:

@@ -102,7 +102,7 @@ def find_without_gravity(fits: Fits) -> list[tuple[int, float, float, float]]:
             promising.append(k)
     if not promising:
         return []
-    inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+    inflation = fits.identified(Reading()).inflation
     gains, found = np.ones(fits.n_joints), []
     here = NearBodies(fits, Reading(), gains, inflation)
     for k in promising:

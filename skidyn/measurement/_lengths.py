@@ -162,7 +162,7 @@ def find_lengths(fits: Fits) -> Stretched | None:
     bodies = np.flatnonzero(long & (tree.parents >= 0)).tolist()
     if not bodies or not np.any(fits.robot.inertial_parameters):
         return None
-    inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+    inflation = fits.identified(Reading()).inflation
     gains = np.ones(fits.n_joints)
     here = there = NearBodies(fits, Reading(), gains, inflation)
     factors: Array = np.zeros(len(bodies))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction
+from skidyn.measurement._fits import Fits, Reading, friction
 from skidyn.measurement._loads import LOAD, by_recording, n_loads
 from skidyn.measurement._robust import FREEDOM, student
 from skidyn.robots import Robot
@@ -92,7 +92,7 @@ class NearBodies:
         read = [fits.torque_column(reading, j) for j in range(fits.n_joints)]
         self.joints = [j for j, (column, _) in enumerate(read) if fits.usable(column)]
         self.inflation = [float(inflation[read[j][0]]) for j in self.joints]
-        number = self.signals.trajectory[::SAMPLES] if fits.loads else np.zeros(fits.n_rows, int)
+        number = fits.recording if fits.loads else 0 * fits.recording
         self.n_loads = n_loads(number)
         self.n_bodies, self.size = stated.size, stated.size + 4 * len(self.joints) + self.n_loads
         self.rows: list[NDArray[np.bool_]] = []

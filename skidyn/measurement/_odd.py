@@ -9,13 +9,12 @@ from functools import partial
 from itertools import repeat
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.measurement._bodies import USUAL, Explained, explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
-from skidyn.measurement._fits import SAMPLES, Fits, Reading
+from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd_order import find_exchanges
 from skidyn.measurement._peak import climb
@@ -124,7 +123,7 @@ class OddRecording(Check):
                     scaled.append(one)
                 elif one.gain > least and one.larger > LARGER and one.likeness < UNLIKE:
                     # a contact, or a payload of one recording, would look like it
-                    without, left, _ = left_by_effects(seen.fits, k, _rows_of(seen.fits, one.run))
+                    without, left, _ = left_by_effects(seen.fits, k, seen.fits.recording == one.run)
                     if left > max(LARGER, LEFT * without):
                         unlike.append(one)
         shifted = {}
@@ -205,12 +204,12 @@ def _sizes(measurement: Measurement) -> dict[int, float]:
 
 def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
     """Joint, angle and gain of another zero in a recording, for bodies of the others."""
-    rows = _rows_of(fits, run)
+    rows = fits.recording == run
     if rows.all() or rows.sum() < FEWEST:
         return None
     bodies, scales = fits.only(~rows).bodies()
     own = fits.only(rows)
-    inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+    inflation = fits.identified(Reading()).inflation
 
     def likelihood(joint: int, angle: float) -> float:
         left = own.residuals(bodies, Reading(zero=((joint, angle),)))
@@ -248,19 +247,14 @@ def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
     return (joint, angle, float(gain)) if share < min(LEFT, BETTER * left / without) else None
 
 
-def _rows_of(fits: Fits, run: int) -> NDArray[np.bool_]:
-    """Rows of a recording."""
-    return np.asarray(fits.signals.trajectory[::SAMPLES] == run)
-
-
 def _multiples(seen: Explained) -> list[Multiple]:
     """Multiples of every joint and recording with enough rows."""
     fits, outcome = seen.fits, seen.identified
     # one of few recordings distorts the bodies identified from all of them
     apart = bool(np.any(seen.errors[1] > SPOILED))
     told = []
-    runs = np.unique(fits.signals.trajectory)
-    parts = [_rows_of(fits, run) for run in runs]
+    runs = np.unique(fits.recording)
+    parts = [fits.recording == run for run in runs]
     elsewhere = fits.predicted_without(parts) if apart else repeat({})
     for run, rows, others in zip(runs, parts, elsewhere, strict=False):
         for k in seen.joints:
@@ -278,7 +272,7 @@ def _multiples(seen: Explained) -> list[Multiple]:
             found = _multiple(y[own], predicted, scale) if own.sum() >= FEWEST else None
             if found is not None:
                 size, likeness, gain, larger = found
-                gain /= max(1.0, outcome.inflation_of(k))
+                gain /= outcome.inflation_of(k)
                 told.append(Multiple(k, int(run), size, likeness, gain, larger, bool(spoils)))
     return told
 

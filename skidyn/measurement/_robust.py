@@ -191,6 +191,20 @@ def student(residual: Array, scale: float) -> float:
     return float(len(residual) * (constant - np.log(scale)) - (FREEDOM + 1) / 2 * spread.sum())
 
 
+def gains_of(before: Sequence[RobustFit], after: Sequence[RobustFit]) -> list[float]:
+    """Log-likelihood that fits of the same rows gain over others, by joint.
+
+    Parameters
+    ----------
+    before, after : sequence of RobustFit
+        Fits of the same joints.
+    """
+    return [
+        (there.likelihood - here.likelihood) / there.inflation
+        for here, there in zip(before, after, strict=True)
+    ]
+
+
 def robust_weights(fit: RobustFit) -> Array:
     """Weight of every row of a robust fit, over the square of its scale."""
     return (FREEDOM + 1) / (FREEDOM + (fit.residual / fit.scale) ** 2) / fit.scale**2

@@ -53,7 +53,7 @@ def find_size(fits: Fits, factors: Mapping[int, float]) -> tuple[float, float] |
     change = there.margin(scaled.identified(Reading()))
     for k, factor in factors.items():  # the density of a torque is that of the scaled one, times it
         rows = float(fits.moving[:, k].sum())
-        change[k] -= rows * np.log(factor) / max(there.inflation_of(k), 1.0)
+        change[k] -= rows * np.log(factor) / there.inflation_of(k)
     if min(gain, float(change.sum())) < LEAST:
         return None
     return float(np.exp(log)), gain

@@ -403,7 +403,7 @@ def _sharpened(fits: Fits, size: float, joints: frozenset[int] | None) -> float:
     Gears have whole ratios, mostly round ones.
     """
     fits = fits.loaded(_sized(size, joints))
-    inflation = np.maximum(fits.identified(_sized(size, joints)).inflation, 1.0)
+    inflation = fits.identified(_sized(size, joints)).inflation
 
     def likelihood(log: float) -> float:
         outcome = fits.identified(_sized(float(np.exp(log)), joints))
