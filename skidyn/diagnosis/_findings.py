@@ -22,6 +22,8 @@ from skidyn.evidence import Problem
 RIVAL_SHARE = 0.8
 #: Points of a curve.
 BINS = 40
+#: Number of times at which an effect acts that are listed.
+LISTED = 4
 
 
 @dataclass(frozen=True)
@@ -199,7 +201,7 @@ def make_finding(
     else:
         code = f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'
     sentence = f"{told_briefly(title, joints, term.trajectories, parameters)}. "
-    sentence += _spans_told(term)
+    sentence += f"It {spans_told(term.spans)}. " if term.spans else ""
     sentence += f"It {course_told(term)}. " if term.course else ""
     sentence += _fall_told(error_drop)
     if rivals:
@@ -298,16 +300,22 @@ def _stem(name: str) -> str:
     return stem if axis in ("x", "y", "z") else name
 
 
-def _spans_told(term: Term) -> str:
-    """Times at which an effect begins or ends within recordings."""
-    if not term.spans:
-        return ""
+def spans_told(spans: Sequence[tuple[int, float, float]]) -> str:
+    """When an effect acts that begins or ends within recordings, as a predicate.
+
+    Parameters
+    ----------
+    spans : sequence of (int, float, float)
+        Recording, and time of begin and end in it, s; at least one.
+    """
     times = [
         f"from {start:.1f} to {end:.1f} s of trajectory {name}"
-        for name, start, end in term.spans[:4]
+        for name, start, end in spans[:LISTED]
     ]
-    more = len(term.spans) - 4
-    return f"It acts {listed([*times, f'in part of {more} more'] if more > 0 else times)}. "
+    more = len(spans) - LISTED
+    if more > 0:
+        times.append(f"at {more} other time{'s' if more > 1 else ''}")
+    return f"acts {listed(times)}"
 
 
 def course_told(term: Term) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from skidyn._text import digits, fall, give_or_take, inside, joints_told, listed, raised, times
 from skidyn.diagnosis._failures import FAILS
-from skidyn.diagnosis._findings import course_told, pairs_of, rival_title
+from skidyn.diagnosis._findings import course_told, pairs_of, rival_title, spans_told
 from skidyn.diagnosis._rule import GUESS
 from skidyn.diagnosis._servo_motion import servo_motion_told
 from skidyn.effects import get_effect
@@ -381,11 +381,8 @@ def trajectories_told(finding: Finding) -> str:
 
 def when_told(finding: Finding) -> str:
     """When a finding acts or how it changes, as a predicate; empty if it always acts alike."""
-    times = [
-        f"from {e.start:.1f} to {e.end:.1f} s of trajectory {e.trajectory}" for e in finding.when
-    ]
-    if times:
-        return "acts " + listed(times[:3] + (["at other times"] if len(times) > 3 else []))
+    if finding.when:
+        return spans_told([(e.trajectory, e.start, e.end) for e in finding.when])
     return next(filter(None, map(course_told, finding.terms)), "")
 
 
