@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array, Signals
+from skidyn._signals import Array, Signals, rates_of
 from skidyn.measurement._measures import (
     COARSE,
     excited,
@@ -162,8 +162,8 @@ class Measurement:
             Rows that were not read.
         """
         s, left = self.recorded, self.recorded.take(~rows)
-        if np.allclose(s.dq, _differences(s)):
-            left = left.with_(dq=_differences(left))
+        if np.allclose(s.dq, rates_of(s.q, s.clock, s.segments)):
+            left = left.with_(dq=rates_of(left.q, left.clock, left.segments))
         self.signals, self.torque = left, self.torque[~rows]
         self._forget()
         self.__post_init__()
@@ -415,12 +415,3 @@ class Measurement:
             lost = self.missing[:, k]
             filled[lost, k] = np.interp(rows[lost], rows[~lost], filled[~lost, k])
         return filled
-
-
-def _differences(s: Signals) -> Array:
-    """Central differences of the positions; zero where a row is alone."""
-    rates = np.zeros_like(s.q)
-    for rows in s.segments:
-        if rows.stop - rows.start > 1:
-            rates[rows] = np.gradient(s.q[rows], s.clock[rows], axis=0)
-    return rates
