@@ -18,6 +18,7 @@ from skidyn._commands._input import (
 )
 from skidyn._commands._output import print_json, working, write_table
 from skidyn._exceptions import SkidynError
+from skidyn._text import joints_told
 
 DESCRIPTION = """\
 With --model and --log, simulate a fitted model along a log and print how far its motion deviates
@@ -161,8 +162,7 @@ def _told(effect: str | None, joints: list[int], parameters: Mapping[str, Any]) 
     """Description of the hidden effect."""
     if effect is None:
         return "nothing"
-    where = f" on joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))}"
-    lines = [f"{effect}{where if joints else ''}"]
+    lines = [f"{effect} on {joints_told(joints)}" if joints else effect]
     for name, value in parameters.items():
         numbers = value if isinstance(value, (list, tuple)) else [value]
         shown = (f"{x:.4g}" if isinstance(x, float) else str(x) for x in numbers)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn._text import give_or_take, inside, listed
+from skidyn._text import give_or_take, inside, joints_told, listed, trajectories_told
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._episodes import Episode
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis
@@ -189,7 +189,7 @@ def make_finding(
     title = effect.title
     if unknown:
         own = effect.words(term.shape) if isinstance(effect, NamelessEffect) else ""
-        title = own or f"Unknown torque that depends on {' and '.join(variables)}"
+        title = own or f"Unknown torque that depends on {listed(variables)}"
     relatives = [k for k in rivals if k != UNKNOWN and get_effect(k).family == effect.family]
     if effect.family and relatives:
         title = f"{effect.family.capitalize()}, best described by {title}"
@@ -241,7 +241,7 @@ def make_finding(
 
 def pairs_of(pairs: Sequence[Sequence[int]]) -> str:
     """Text of pairs of joints for a sentence."""
-    return listed([f"joints {' and '.join(map(str, joints))}" for joints in pairs], "or")
+    return listed(list(map(joints_told, pairs)), "or")
 
 
 def _joints(problem: Problem, hypothesis: Hypothesis, candidate: Candidate) -> tuple[int, ...]:
@@ -282,10 +282,9 @@ def told_briefly(
     parameters: dict[str, dict[str, Any]],
 ) -> str:
     """Effect, joints, and its first parameter or vector, without a full stop."""
-    where = f"joint {joints[0]}" if len(joints) == 1 else f"joints {', '.join(map(str, joints))}"
+    where = joints_told(joints)
     if trajectories is not None:
-        many = "y" if len(trajectories) == 1 else "ies"
-        where += f" in trajector{many} {', '.join(map(str, trajectories))}"
+        where += f" in {trajectories_told(trajectories)}"
     # the first that is not zero, with the other components of its vector
     rows = sorted(parameters.items(), key=lambda item: _may_be_zero(item[1]))
     stem = _stem(rows[0][0]) if rows else ""

@@ -55,7 +55,7 @@ class Acceleration(Check):
         joints: list[int],
         slopes: list[tuple[float, float]],
     ) -> Suspicion:
-        names = ", ".join(measurement.joint(k) for k in joints)
+        names = measurement.joints(joints)
         numbers = ", ".join(f"{slope:.3g} (correlation {alike:.2f})" for slope, alike in slopes)
         evidence = (
             f"the acceleration is {numbers} times the differentiated velocity; models that are "

@@ -41,7 +41,7 @@ class DeadBand(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         found = dead_bands(measurement)
         if found:
-            names = ", ".join(measurement.joint(k) for k in found)
+            names = measurement.joints(found)
             told_shares = ", ".join(f"{share:.1%}" for share in found.values())
             yield self.suspicion(
                 f"the torque of {names} is reported as zero when it is small",
@@ -119,7 +119,7 @@ class TaredTorque(Check):
                     else "has zero mean in every recording: the mean was removed"
                 )
                 yield self.suspicion(
-                    f"the torque of {', '.join(measurement.joint(k) for k in joints)} {how}",
+                    f"the torque of {measurement.joints(joints)} {how}",
                     "the torque varies with gravity as the joints move, but the gravity torque "
                     + ("at the start" if what == "start" else "on average")
                     + " is missing; record the torque as measured, or add the gravity torque",

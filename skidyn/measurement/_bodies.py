@@ -279,7 +279,7 @@ class TorqueScale(Check):
                     _gain_remedy({k: 1 / KILO}),
                 )
         if beyond:
-            names = ", ".join(measurement.joint(k) for k in beyond)
+            names = measurement.joints(beyond)
             sizes = ", ".join(f"{size:.3g}" for size in beyond.values())
             evidence.append(f"it reaches {sizes} times the effort limit of {names}")
         if found or beyond:
@@ -297,7 +297,7 @@ class TorqueScale(Check):
                 factors |= scales.factors
             joints = sorted(factors)
             yield self.suspicion(
-                f"the torque of {', '.join(measurement.joint(k) for k in joints)} has a different "
+                f"the torque of {measurement.joints(joints)} has a different "
                 "scale than that of the other joints",
                 "; ".join(evidence),
                 "suspected",
@@ -506,7 +506,7 @@ class UnexplainedTorque(Check):
             joints = [k for k in joints if k not in shared]
         bad = np.isin(seen.joints, joints)
         if joints:
-            names = ", ".join(measurement.joint(k) for k in joints)
+            names = measurement.joints(joints)
             shares = ", ".join(f"{100 * share:.0f} %" for share in least[bad])
             others = ", ".join(f"{100 * share:.0f} %" for share in held[bad])
             yield self.suspicion(

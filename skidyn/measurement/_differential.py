@@ -74,7 +74,7 @@ class MotorsOfDifferential(Check):
         if found is None:
             return
         measurement.mixed = True
-        names = " and ".join(measurement.joint(k) for k in found.joints)
+        names = measurement.joints(found.joints)
         words = ",".join(f"{name}={text}" for name, text in found.sums.items())
         yield self.suspicion(
             f"the torques of {names} are those of the two motors of a differential",

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
+from skidyn._text import trajectories_told
 from skidyn.measurement._bodies import CLEARLY, explained, joint_gain
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
@@ -116,9 +117,8 @@ class DividedRecordings(Check):
             "scale": f"the torque of {name} is {best.value:.3g} times that of the others",
             "zero": f"the zero of {name} differs by about {np.rad2deg(best.value):.0f} deg",
         }[best.kind]
-        runs = ", ".join(map(str, best.runs))
         yield self.suspicion(
-            f"in trajectories {runs} {what}",
+            f"in {trajectories_told(best.runs)} {what}",
             "with this correction, identified bodies explain the torque of all trajectories better "
             f"by {best.gain:.0f} (log-likelihood) and leave {100 * best.drop:.0f} % less residual; "
             "fix these files, or diagnose them separately",

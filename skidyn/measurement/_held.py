@@ -64,8 +64,7 @@ class HeldTorque(Check):
         held = np.flatnonzero(shares)
         if len(held):
             yield self.suspicion(
-                f"the torque of {', '.join(measurement.joint(int(k)) for k in held)} holds its "
-                "last value",
+                f"the torque of {measurement.joints(held)} holds its last value",
                 f"in {100 * shares[held].max():.0f} % of the rows in which positions change: it is "
                 "reported less often",
                 "suspected",
@@ -117,7 +116,7 @@ class HeldVelocity(Check):
             if share > HELD:
                 shares[k] = share
         if shares:
-            names = ", ".join(map(measurement.joint, shares))
+            names = measurement.joints(shares)
             columns = [f"dq{k + 1}" for k in shares]
             yield self.suspicion(
                 f"the velocity of {names} holds its last value",
@@ -204,7 +203,7 @@ class MissingTorque(Check):
         joints = np.flatnonzero(missing.any(axis=0)).tolist()
         if joints and not measurement.lost:
             rows = missing.any(axis=1)
-            names = ", ".join(measurement.joint(k) for k in joints)
+            names = measurement.joints(joints)
             yield self.suspicion(
                 f"missing torques of {names} were replaced by zero",
                 f"in {int(rows.sum())} rows, {rows.mean():.1%} (the first in row "

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals, rates_of
+from skidyn._text import listed
 from skidyn.measurement._measures import (
     COARSE,
     excited,
@@ -199,6 +200,16 @@ class Measurement:
         """
         name = str(self.joint_names[k])
         return name if name == f"joint {k + 1}" else f"joint {k + 1} ({name})"
+
+    def joints(self, joints: Iterable[int]) -> str:
+        """Names of several joints for a sentence.
+
+        Parameters
+        ----------
+        joints : iterable of int
+            Joints, counted from 0.
+        """
+        return listed([self.joint(int(k)) for k in joints])
 
     @cached_property
     def steps(self) -> Array:

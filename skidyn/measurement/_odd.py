@@ -96,7 +96,7 @@ class OddRecording(Check):
         exchanged = list(find_exchanges(seen))
         for pair in exchanged:
             measurement.odd = True
-            names = " and ".join(measurement.joint(k) for k in pair.joints)
+            names = measurement.joints(pair.joints)
             yield self.suspicion(
                 f"in trajectory {pair.run} the torques of {names} are exchanged",
                 "each is what the other trajectories predict for the other joint, which improves "
@@ -155,7 +155,7 @@ class OddRecording(Check):
             )
         for run in sorted({one.run for one in scaled}):
             own = [one for one in scaled if one.run == run]
-            names = ", ".join(measurement.joint(one.joint) for one in own)
+            names = measurement.joints(one.joint for one in own)
             multiples = ", ".join(f"{one.multiple:.3g}" for one in own)
             yield self.suspicion(
                 f"in trajectory {run} the torque of {names} has a different sign or scale than in "
@@ -170,7 +170,7 @@ class OddRecording(Check):
             return  # the rest is due to another friction
         for run in sorted({one.run for one in unlike} - {one.run for one in scaled}):
             own = [one for one in unlike if one.run == run]
-            names = ", ".join(measurement.joint(one.joint) for one in own)
+            names = measurement.joints(one.joint for one in own)
             shares = ", ".join(f"{one.larger:.2g}" for one in own)
             yield self.suspicion(
                 f"in trajectory {run} the torque of {names} is nearly unrelated to the motion",

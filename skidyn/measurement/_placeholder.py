@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from skidyn._text import joints_told, listed
+
 #: Quantities of a measurement, and their plurals.
 CHANNELS = {"q": "positions", "dq": "velocities", "tau": "torques"}
 
@@ -72,7 +74,6 @@ def in_words(channels: Sequence[tuple[str, int]], n: int) -> str:
             alike.setdefault(joints, []).append(name)
     told = []
     for joints, names in alike.items():
-        numbers = ", ".join(str(k + 1) for k in joints)
-        owner = f"joint{'s' if len(joints) > 1 else ''} {numbers}"
-        told.append(f"{', '.join(names)} of {'all joints' if len(joints) == n > 1 else owner}")
-    return " and ".join(told)
+        owner = "all joints" if len(joints) == n > 1 else joints_told(k + 1 for k in joints)
+        told.append(f"{listed(names)} of {owner}")
+    return listed(told)

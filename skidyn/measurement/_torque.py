@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from skidyn._signals import Array
+from skidyn._text import listed
 from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._fits import Fits, Reading, friction
@@ -37,7 +38,7 @@ class UnsignedTorque(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         cut = measurement.clipped
         if cut:
-            names = ", ".join(measurement.joint(k) for k in cut)
+            names = measurement.joints(cut)
             shares = ", ".join(f"{np.mean(measurement.torque[:, k] == 0):.0%}" for k in cut)
             yield self.suspicion(
                 f"the torque of {names} is clipped at zero",
@@ -51,7 +52,7 @@ class UnsignedTorque(Check):
             return
         moving = [k for k, moves in enumerate(measurement.excited) if moves]
         every = len(unsigned) >= 3 and set(moving) <= set(unsigned)
-        names = ", ".join(measurement.joint(k) for k in unsigned)
+        names = measurement.joints(unsigned)
         evidence = (
             f"of {measurement.n_samples} rows none is negative although the joints reverse "
             f"{sum(_turns(measurement, k) for k in unsigned)} times"
@@ -200,7 +201,7 @@ class Columns(Check):
         joints = sorted(set(turned))
         if kind.endswith("_sign"):  # a sign changed twice is unchanged
             joints = [j for j in joints if turned.count(j) % 2]
-        names = ", ".join(measurement.joint(j) for j in joints)
+        names = measurement.joints(joints)
         best = max(changes, key=lambda change: change.gain)
         evidence = (
             "with this correction, the rigid-body torque explains the measured torque better by "
@@ -276,14 +277,14 @@ def _ordered(measurement: Measurement, final: Reading) -> tuple[str, tuple[str, 
     moved = sorted(
         {k for order in orders.values() for k, c in zip(every, order, strict=True) if c != k + 1}
     )
-    names = ", ".join(measurement.joint(k) for k in moved)
+    names = measurement.joints(moved)
     if motion == torque:
         words = ",".join(map(str, motion))
         what = f"the columns of {names} are not in the order of the robot's joints"
         return what, (f"--order {words}", f"order={motion}")
     orders = {q: order for q, order in orders.items() if order != own}
     called = {"motion": "positions and velocities", "tau": "torques"}
-    said = " and ".join(called[q] for q in orders)
+    said = listed([called[q] for q in orders])
     words = ",".join(f"{q}={','.join(map(str, order))}" for q, order in orders.items())
     return f"the {said} of {names} are exchanged", (f"--order {words}", f"order={orders}")
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
+from skidyn._text import trajectories_told
 from skidyn.measurement._check import Check
 from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._measurement import ALIKE, Measurement
@@ -154,8 +155,7 @@ class PositionUnit(Check):
             measurement.odd = True
             largest = np.abs(measurement.signals.q).max()
             yield self.suspicion(
-                f"in trajectory {', '.join(map(str, odd))} positions have a different unit than "
-                "in the others",
+                f"in {trajectories_told(odd)} positions have a different unit than in the others",
                 f"their spread there is {min(odd.values()):.3g} times that of the others, up to "
                 f"{largest:.4g} rad; fix that file, or leave it out",
                 "certain",

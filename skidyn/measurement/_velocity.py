@@ -72,7 +72,7 @@ class Velocity(Check):
         if order is not None:
             moved = [k for k, column in enumerate(order) if column != k]
             numbers = [column + 1 for column in order]
-            names = ", ".join(measurement.joint(k) for k in moved)
+            names = measurement.joints(moved)
             words = ",".join(map(str, numbers))
             told = self.suspicion(
                 f"the velocities of {names} are exchanged",
@@ -84,7 +84,7 @@ class Velocity(Check):
             return [told]
         constant = _constant(measurement)
         if constant:
-            names = ", ".join(measurement.joint(k) for k in constant)
+            names = measurement.joints(constant)
             told = self.suspicion(
                 f"the velocity of {names} does not belong to the position: one of them is constant",
                 "the other changes in most rows",
@@ -152,7 +152,7 @@ class Velocity(Check):
         )
 
     def _told(self, measurement: Measurement, cause: str, joints: list[int]) -> Suspicion:
-        names = ", ".join(measurement.joint(k) for k in joints)
+        names = measurement.joints(joints)
         slopes = ", ".join(
             f"{slope / measurement.clock:.4g} (correlation {likeness:.3f})"
             for slope, likeness in (measurement.velocities[k] for k in joints)

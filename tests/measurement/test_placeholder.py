@@ -26,5 +26,5 @@ def test_no_digit_of_a_value_is_lost():
 
 
 def test_channels_in_words():
-    assert in_words(ALL[:4], 2) == "positions, velocities of all joints"
+    assert in_words(ALL[:4], 2) == "positions and velocities of all joints"
     assert in_words([("tau", 0), ("q", 1)], 2) == "positions of joint 2 and torques of joint 1"
