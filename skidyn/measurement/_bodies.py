@@ -21,7 +21,7 @@ from skidyn.measurement._peak import climb, peak
 from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, MOST_ROWS
 from skidyn.measurement._robust import ROUNDS, fit_admissible
 from skidyn.measurement._size import find_size
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 from skidyn.measurement._torque import asked_changes, readable_fits
 
 #: Least log-likelihood gain of another scale, and its value if the stated bodies do not confirm it.
@@ -161,13 +161,13 @@ class TorqueScale(Check):
         rate = None if measurement.stale else _other_rate(fits.loaded(), bool(odd))
         if rate is not None:
             value = float(f"{rate:.4g}")
-            words = f"time={1 / value:.6g},dq={value:g}"
+            scales = {"time": float(f"{1 / value:.6g}"), "dq": value}
             yield self.suspicion(
                 "the clock runs at a different rate, and the velocities were derived with it",
                 f"with a sampling rate {value:g} times as high, the rigid-body torque explains "
                 f"the measured torque better by {_rate_gain(fits, rate):.0f} (log-likelihood)",
                 "suspected",
-                remedy=(f"--gain {words}", f"gain={{'time': {1 / value:.6g}, 'dq': {value:g}}}"),
+                remedy=remedy_of("gain", scales),
             )
             return
         every = bool(odd) and (_one_sided(values) or (len(sure) > 1 and _one_sided(sure)))
@@ -192,7 +192,7 @@ class TorqueScale(Check):
                 f"it is the rigid-body torque times {told}",
                 "certain",
                 sorted(gains),
-                (f"--units tau={unit}", f"units={{'tau': '{unit}'}}"),
+                remedy_of("units", {"tau": unit}),
             )
             return
         factors = _all_factors(fits, gains, typical)
@@ -378,9 +378,7 @@ def _one_sided(gains: Array) -> bool:
 
 def _gain_remedy(factors: dict[int, float]) -> tuple[str, str]:
     """Factors of torques as an option."""
-    pairs = {f"tau{k + 1}": value for k, value in factors.items()}
-    words = ",".join(f"{name}={value:g}" for name, value in pairs.items())
-    return f"--gain {words}", f"gain={pairs}"
+    return remedy_of("gain", {f"tau{k + 1}": value for k, value in factors.items()})
 
 
 def _unit_like(gain: float) -> float | None:

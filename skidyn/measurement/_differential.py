@@ -20,7 +20,7 @@ from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._robust import fit_admissible
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Log-likelihood that sum and difference must gain over any sign and order of the two torques, with
 #: the stated bodies, whose torque may be small beside friction, and with identified ones.
@@ -75,7 +75,6 @@ class MotorsOfDifferential(Check):
             return
         measurement.mixed = True
         names = measurement.joints(found.joints)
-        words = ",".join(f"{name}={text}" for name, text in found.sums.items())
         yield self.suspicion(
             f"the torques of {names} are those of the two motors of a differential",
             "their sum and difference agree with the torques of the stated bodies better than the "
@@ -84,7 +83,7 @@ class MotorsOfDifferential(Check):
             "gears of another ratio need a gain as well",
             "suspected",
             found.joints,
-            (f"--combine {words}", f"combine={found.sums}"),
+            remedy_of("combine", found.sums),
         )
 
 

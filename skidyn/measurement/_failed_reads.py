@@ -13,8 +13,8 @@ from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import MANY_MISSING
-from skidyn.measurement._placeholder import CHANNELS, exactly, in_words, placeholder_remedy
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._placeholder import CHANNELS, in_words, placeholder_remedy
+from skidyn.measurement._suspicion import Suspicion, exactly
 
 #: Most rows of a failed read. How many times as far as the values before and after it are from
 #: each other, and as nine tenths of the other steps of the channel, it is from both; the same as a

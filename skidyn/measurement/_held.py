@@ -20,7 +20,7 @@ from skidyn.measurement._measures import (
     position_step,
 )
 from skidyn.measurement._placeholder import placeholder_remedy
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Least share of rows with the torque of the previous row, for a torque that is not coarse.
 HELD = 0.3
@@ -51,7 +51,7 @@ class HeldTorque(Check):
                 f"in {share:.0%} of the rows in which positions change, all of them at once: they "
                 "are reported less often",
                 "certain",
-                remedy=("--drop-repeated", "drop_repeated=True"),
+                remedy=remedy_of("drop_repeated", True),
             )
             return
         shares, lost = np.zeros(measurement.n_joints), measurement.clipped
@@ -124,7 +124,7 @@ class HeldVelocity(Check):
                 "accelerates: it is reported less often",
                 "suspected",
                 list(shares),
-                (f"--derive {','.join(columns)}", f"derive={columns}"),
+                remedy_of("derive", columns),
             )
 
 

@@ -14,7 +14,7 @@ from skidyn.measurement._delay import NEAR, JointFit
 from skidyn.measurement._fits import Fits
 from skidyn.measurement._peak import climb, vertex
 from skidyn.measurement._robust import robust_likelihood
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Time constants that are tried, in lags that a delay in its place has; steps of their logarithm
 #: that are halved, and the least one.
@@ -47,7 +47,7 @@ def suspect_lowpass(
         evidence,
         "suspected",
         joints,
-        (f"--lowpass {column}={value:g}", f"lowpass={{'{column}': {value:g}}}"),
+        remedy_of("lowpass", {column: value}),
     )
 
 

@@ -17,7 +17,7 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes, is_oblique
 from skidyn.measurement._robust import fit_admissible
-from skidyn.measurement._suspicion import Certainty, Suspicion
+from skidyn.measurement._suspicion import Certainty, Suspicion, remedy_of
 
 #: Share of the largest torque below zero that a magnitude may reach, and reversals it must see.
 BELOW, TURNS = 0.01, 4
@@ -67,7 +67,7 @@ class UnsignedTorque(Check):
             evidence,
             "certain" if every or max(gains.values(), default=0) > SURE else "suspected",
             unsigned,
-            ("--torque-sign command", "torque_sign='command'"),
+            remedy_of("torque_sign", "command"),
         )
 
 
@@ -217,15 +217,15 @@ class Columns(Check):
         if kind == "torque_sign":
             columns = [f"tau{j + 1}" for j in joints]
             what = f"the torque of {names} has the opposite sign"
-            remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
+            remedy = remedy_of("flip", columns)
         elif kind == "motion_sign":
             columns = [f"q{j + 1}" for j in joints]
             what = f"position and velocity of {names} have the opposite sign"
-            remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
+            remedy = remedy_of("flip", columns)
         elif kind == "joint_sign":
             columns = [f"{q}{j + 1}" for j in joints for q in ("q", "tau")]
             what = f"the direction of {names} is opposite to that of the robot's description"
-            remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
+            remedy = remedy_of("flip", columns)
         elif kind in ORDERS:
             what, remedy = _ordered(measurement, final)
         elif kind == "summed":
@@ -234,14 +234,12 @@ class Columns(Check):
                 "relative to a link other than its parent"
             )
             others = {f"q{j + 1}": f"{'-' * (x < 0)}q{j}" for j, x in final.summed if j in joints}
-            words = ",".join(f"{name}={other}" for name, other in others.items())
-            remedy = (f"--summed {words}", f"summed={others}")
+            remedy = remedy_of("summed", others)
         elif kind == "zero":
             values = ", ".join(f"{np.rad2deg(v):.0f} deg" for j, v in final.zero if j in joints)
             what = f"the zero of {names} is off by about {values}"
             pairs = {f"q{j + 1}": round(v, 4) for j, v in final.zero if j in joints}
-            words = ",".join(f"{name}={value}" for name, value in pairs.items())
-            remedy = (f"--zero {words}", f"zero={pairs}")
+            remedy = remedy_of("zero", pairs)
         else:
             gravity = [round(x, 2) + 0.0 for x in (final.gravity or ())]
             words = ",".join(f"{x:g}" for x in gravity)
@@ -255,9 +253,9 @@ class Columns(Check):
                 what = "the torque contains no gravity: it was removed"
                 if changes[0].restorable:
                     what += " with the bodies of the description"
-                    remedy = ("--restore-gravity", "restore_gravity=True")
+                    remedy = remedy_of("restore_gravity", True)
                 else:
-                    remedy = ("--gravity none", "gravity='none'")
+                    remedy = remedy_of("gravity", "none")
         return self.suspicion(what, evidence, certainty, joints, remedy)
 
 
@@ -279,14 +277,12 @@ def _ordered(measurement: Measurement, final: Reading) -> tuple[str, tuple[str, 
     )
     names = measurement.joints(moved)
     if motion == torque:
-        words = ",".join(map(str, motion))
         what = f"the columns of {names} are not in the order of the robot's joints"
-        return what, (f"--order {words}", f"order={motion}")
+        return what, remedy_of("order", motion)
     orders = {q: order for q, order in orders.items() if order != own}
     called = {"motion": "positions and velocities", "tau": "torques"}
     said = listed([called[q] for q in orders])
-    words = ",".join(f"{q}={','.join(map(str, order))}" for q, order in orders.items())
-    return f"the {said} of {names} are exchanged", (f"--order {words}", f"order={orders}")
+    return f"the {said} of {names} are exchanged", remedy_of("order", orders)
 
 
 def _torque_order(reading: Reading, every: Iterable[int]) -> list[int]:

@@ -15,7 +15,7 @@ from skidyn.measurement._fits import Fits, Reading
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._peak import climb
 from skidyn.measurement._readings import FEWEST_ROWS, MOST_ROWS
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 DEGREE = np.pi / 180
 #: Units of time, of velocities and of positions, by the slope of integrated velocity on position.
@@ -74,7 +74,7 @@ class ClockUnit(Check):
                     f"the integrated velocities are {typical:.4g} times the changes of position "
                     f"(median over {len(slopes)} joints)",
                     "certain",
-                    remedy=unit_remedy({"time": unit}),
+                    remedy=remedy_of("units", {"time": unit}),
                 )
                 return
         shared = measurement.velocity_scale
@@ -93,7 +93,7 @@ class ClockUnit(Check):
                 f"time may be in {unit}",
                 f"the median time step is {1 / measurement.rate:.4g} s",
                 "noted" if agrees else "suspected",
-                remedy=unit_remedy({"time": unit}),
+                remedy=remedy_of("units", {"time": unit}),
             )
             return
         if measurement.lost:
@@ -122,7 +122,7 @@ class ClockUnit(Check):
             f"integrated velocities are {shared:.4g} times the changes of position, equally in "
             f"all joints{doubt}",
             "certain" if told else "suspected",
-            remedy=(f"--gain {best}={value:g}", f"gain={{'{best}': {value:g}}}"),
+            remedy=remedy_of("gain", {best: value}),
         )
 
 
@@ -147,7 +147,7 @@ class PositionUnit(Check):
                     f"velocities are {typical:.4g} times the differentiated positions (median over "
                     f"{len(slopes)} joints)",
                     "certain",
-                    remedy=unit_remedy({"q": unit}),
+                    remedy=remedy_of("units", {"q": unit}),
                 )
                 return
         odd = _odd_runs(measurement)
@@ -172,7 +172,7 @@ class PositionUnit(Check):
                 f"{1 / shared:.5g} times as fast as the velocities imply ({counts:.6g} per turn)",
                 "certain",
                 np.flatnonzero(far),
-                (f"--gain q={shared:.9g}", f"gain={{'q': {shared:.9g}}}"),
+                remedy_of("gain", {"q": float(f"{shared:.9g}")}),
             )
             return
         both = {"q": "deg", "dq": "deg/s"} if abs(typical - 1) < NEAR else {"q": "deg"}
@@ -193,14 +193,13 @@ class PositionUnit(Check):
             slope, likeness = measurement.velocities[k]
             both = likeness > ALIKE and abs(slope - 1) < NEAR
             gains = dict.fromkeys([f"q{k + 1}", f"dq{k + 1}"] if both else [f"q{k + 1}"], 1e-3)
-            words = ",".join(f"{name}={size:g}" for name, size in gains.items())
             measurement.millimetres.add(k)
             yield self.suspicion(
                 f"the position of {measurement.joint(k)} looks like millimetres",
                 f"it reaches {largest[k]:.4g} where the limit is {limits[k]:.3g} m",
                 "certain",
                 [k],
-                (f"--gain {words}", f"gain={gains}"),
+                remedy_of("gain", gains),
             )
 
     def _by_turns(self, measurement: Measurement, both: dict[str, str]) -> Iterator[Suspicion]:
@@ -214,7 +213,7 @@ class PositionUnit(Check):
                 f"q{k + 1} reaches {largest[k]:.4g} rad, {largest[k] / 2 / np.pi:.1f} turns",
                 "suspected" if int(np.sum(largest > 4 * np.pi)) > 1 else "noted",
                 [k],
-                unit_remedy(both),
+                remedy_of("units", both),
             )
 
     def _beyond_limits(self, measurement: Measurement, both: dict[str, str]) -> Iterator[Suspicion]:
@@ -246,14 +245,13 @@ class PositionUnit(Check):
         if ratio is not None and (not degrees or gained >= DECISIVE):
             value = float(f"{1 / ratio:.4g}")
             moving = dict.fromkeys(both, value)
-            words = ",".join(f"{name}={size:g}" for name, size in moving.items())
             yield self.suspicion(
                 "positions and velocities are those of the motors before the gears, or have an "
                 "unknown unit",
                 f"{seen}; divided by {ratio:.3g} they explain the torque best",
                 "certain",
                 np.flatnonzero(outside),
-                (f"--gain {words}", f"gain={moving}"),
+                remedy_of("gain", moving),
             )
         elif degrees and joints is not None and ratio is not None and gained > LEAST:
             yield self.suspicion(
@@ -271,7 +269,7 @@ class PositionUnit(Check):
                 f"{seen}; read as degrees it would be {largest[k] * DEGREE:.3g} rad",
                 "certain" if certain else "suspected",
                 np.flatnonzero(outside),
-                unit_remedy(both),
+                remedy_of("units", both),
             )
         elif _too_far(measurement, DISTANT).any():
             yield self.suspicion(
@@ -462,12 +460,6 @@ class WrappedPosition(Check):
                         f"it jumps by a full turn of {turn:.4g} {unit} {count} time(s)",
                         "certain",
                         [int(k)],
-                        ("--unwrap", "unwrap=True"),
+                        remedy_of("unwrap", True),
                     )
                     break
-
-
-def unit_remedy(units: dict[str, str]) -> tuple[str, str]:
-    """The remedy with units."""
-    words = ",".join(f"{name}={unit}" for name, unit in units.items())
-    return f"--units {words}", f"units={units}"
