@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn._text import trajectories_told
-from skidyn.measurement._bodies import CLEARLY, explained, joint_gain
+from skidyn.measurement._bodies import explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
 from skidyn.measurement._fits import Fits, Outcome, Reading, lines_between
+from skidyn.measurement._gains import CLEARLY, joint_gain
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._peak import climb
 from skidyn.measurement._robust import fit_at_once, fit_together

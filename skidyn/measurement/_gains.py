@@ -10,13 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits, Reading, friction
 from skidyn.measurement._loads import by_recording
 from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies, likely_load
+from skidyn.measurement._peak import climb
+from skidyn.measurement._robust import fit_admissible
 
 #: Most steps, the largest one, and the one that ends them.
 STEPS, FARTHEST, CLOSE = 8, 0.3, 1e-3
@@ -29,6 +32,13 @@ KNOWN_TO = 0.5
 #: which factors of several torques are the same where they are known to a tenth; standard errors
 #: up to which one that is not may be the same.
 ROUND, NEARLY, ALIKE, KNOWN, FAR = 1.5, 0.01, 0.1, 0.1, 3.0
+#: Multiples of the robot's own torque that may be due to wrong masses.
+USUAL = (0.4, 2.5)
+#: Multiples that are attributed to wrong masses unless the other joints contradict.
+CLEARLY = (0.62, 1.6)
+#: Least share of a torque's spread that the robot must explain for its multiple to be known.
+EXPLAINED = 0.5
+AS_IT_IS = Reading()
 
 
 @dataclass(frozen=True)
@@ -150,3 +160,57 @@ def _rounded(factor: float, error: float) -> float:
     best = min(near, key=lambda x: abs(x / factor - 1))
     within = abs(best / factor - 1) < min(NEARLY, ROUND * error)
     return float(f"{best:.6g}" if within else f"{factor:.4g}")
+
+
+def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
+    """Scale of one torque at which identified bodies, which all joints share, explain it best.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    k : int
+        Joint, from 0.
+    gain : float
+        Ratio of its torque to that of the stated bodies.
+
+    Returns
+    -------
+    gain, gained, apart : float
+        Scale, its log-likelihood gain over none, and over one four times as large or as small.
+    """
+    plain = fits.identified(Reading())
+    rows = float(fits.moving[:, k].sum())
+
+    def gained(log: float) -> float:
+        other = fits.scaled({k: float(np.exp(log))}).identified(Reading())
+        # the density of a torque is that of the scaled torque divided by the gain
+        change = other.margin(plain)
+        change[k] -= rows * log / other.inflation_of(k)
+        return float(change.sum())
+
+    @cache  # a search comes back to where it was
+    def at(place: float) -> float:
+        return gained(np.log(gain) + 0.01 * place)
+
+    step = 8  # maxima are narrow if the noise is small
+    first = max(range(-5 * step, 6 * step, step), key=lambda place: (at(place), place))
+    place, best = climb(at, first, step, 0.5)
+    log = np.log(gain) + 0.01 * place
+    far = max(gained(log + x) for x in (-np.log(4), np.log(4)))
+    return float(np.exp(log)), best, best - far
+
+
+def known_gains(fits: Fits, reading: Reading = AS_IT_IS) -> dict[int, float]:
+    """Multiple of the robot's own torque, for columns of which it explains enough."""
+    here = fits.nominal(reading)
+    s = fits.motion(reading)
+    known = {}
+    for k in range(fits.n_joints):
+        if not fits.usable(k) or not here.gain[k] > 0:
+            continue
+        y, use = fits.mean_torque(k)
+        bare = fit_admissible(fits.average(friction(s, k))[use], y[use])
+        if here.scale[k] ** 2 < (1 - EXPLAINED) * bare.scale**2 * (1 - EXPLAINED):
+            known[k] = float(here.gain[k])
+    return known

@@ -11,10 +11,11 @@ from itertools import repeat
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._bodies import USUAL, Explained, explained
+from skidyn.measurement._bodies import Explained, explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
 from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._gains import USUAL
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd_order import find_exchanges
 from skidyn.measurement._peak import climb
@@ -258,8 +259,8 @@ def _multiples(seen: Explained) -> list[Multiple]:
     elsewhere = fits.predicted_without(parts) if apart else repeat({})
     for run, rows, others in zip(runs, parts, elsewhere, strict=False):
         for k in seen.joints:
-            use = fits.moving[:, k]
-            y = fits.average(fits.torque[:, k])[use]
+            y, use = fits.mean_torque(k)
+            y = y[use]
             own, scale = rows[use], float(outcome.scale[k])
             predicted = (y - outcome.residual[k])[own]
             if k in others:

@@ -595,10 +595,10 @@ def fitted_gravity(fits: Fits, reading: Reading, here: Outcome) -> Array | None:
     blocks, targets = [], []
     for j in range(fits.n_joints):
         column, sign = fits.torque_column(reading, j)
-        use = fits.moving[:, column]
         if not fits.usable(column):
             continue
-        y = sign * fits.average(fits.torque[:, column])[use] - still[use, j]
+        torque, use = fits.mean_torque(column)
+        y = sign * torque[use] - still[use, j]
         own = np.column_stack([fits.average(friction(s, j))[use], np.ones(int(use.sum()))])
         basis, _ = np.linalg.qr(own)
         pull = pulls[:, use, j].T

@@ -142,9 +142,8 @@ def _magnitude_gain(fits: Fits, k: int) -> float:
         return 0.0
     s = fits.motion(Reading())
     own = fits.robot.inverse_dynamics(s.q, s.dq, s.ddq)[:, k]
-    use = fits.moving[:, k]
-    columns = fits.average(np.column_stack([own, friction(s, k)]))[use]
-    y = fits.average(fits.torque[:, k])[use]
+    y, use = fits.mean_torque(k)
+    y, columns = y[use], fits.average(np.column_stack([own, friction(s, k)]))[use]
     # a torque of the opposite sign is one-sided too where gravity is
     plain = max(fit_admissible(columns, sign * y).likelihood for sign in (1.0, -1.0))
     best = -np.inf
