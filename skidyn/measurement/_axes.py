@@ -18,9 +18,11 @@ from skidyn.measurement._bodies import explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._divided import divided_zeros
 from skidyn.measurement._duel import duel_of
-from skidyn.measurement._fits import Fits, Outcome, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._near_bodies import NearBodies
+from skidyn.measurement._outcome import Outcome
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, HALF, MOST_ROWS, NEEDED, WEAKEST
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._crosstalk import find_shares
-from skidyn.measurement._fits import Fits, Outcome, Reading, lines_between
+from skidyn.measurement._fits import Fits, lines_between
 from skidyn.measurement._gains import CLEARLY
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._outcome import Outcome
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
 

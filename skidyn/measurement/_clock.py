@@ -314,7 +314,7 @@ def _gained_by_torque(measurement: Measurement) -> float | None:
     fits = measurement.fits
     if fits is None:
         return None
-    from skidyn.measurement._fits import Reading
+    from skidyn.measurement._reading import Reading
     from skidyn.measurement._rows import make_fits  # also imports the evidence
 
     signals = measurement.whole

@@ -16,8 +16,9 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
 

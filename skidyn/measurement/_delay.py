@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
-from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction, lines_between
+from skidyn.measurement._fits import SAMPLES, Fits, friction, lines_between
 from skidyn.measurement._loads import LOAD, by_recording, n_loads
 from skidyn.measurement._peak import peak, vertex
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._robust import FEWEST, RobustFit, fit_together, gains_of
 from skidyn.robots import base_parameter_index
 
@@ -155,7 +156,7 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
     unknown = Delay(
         np.nan, np.nan, np.full(n, np.nan), own_errors, 0.0, own_gains, halves, drifts=drifts
     )
-    s = fits.motion(Reading())
+    s = Reading().motion(fits.signals)
     every = np.arange(10 * fits.robot.n_bodies)
     regressor = fits.mean_regressor(fits.robot, s, every)
     shifted = [fits.average(fits.torque_at(lag)) for lag in lags_tried]
@@ -318,7 +319,7 @@ class JointFit:
 
     def __init__(self, fits: Fits, changed: Sequence[int]) -> None:
         self.fits, self.changed = fits, list(changed)
-        self.signals = s = fits.motion(Reading())
+        self.signals = s = Reading().motion(fits.signals)
         self.base = base_parameter_index(fits.robot)
         last = 10 * fits.robot.n_bodies + LOAD if fits.loads else LOAD[:0]
         regressor = fits.mean_regressor(fits.robot, s, np.append(self.base, last))

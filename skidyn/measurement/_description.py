@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._plausible import (
     GRAMS,
@@ -25,6 +25,7 @@ from skidyn.measurement._plausible import (
     shape_of,
     wrong_units,
 )
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._readings import FEWEST_ROWS, MOST_ROWS
 from skidyn.measurement._suspicion import Certainty, Suspicion
 from skidyn.robots import Robot

@@ -17,8 +17,9 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._robust import fit_admissible
 from skidyn.measurement._suspicion import Suspicion, remedy_of
 

@@ -23,10 +23,12 @@ from skidyn._text import trajectories_told
 from skidyn.measurement._bodies import explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
-from skidyn.measurement._fits import Fits, Outcome, Reading, lines_between
+from skidyn.measurement._fits import Fits, lines_between
 from skidyn.measurement._gains import CLEARLY, joint_gain
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._outcome import Outcome
 from skidyn.measurement._peak import climb
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._robust import fit_at_once, fit_together
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_gain

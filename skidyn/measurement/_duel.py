@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn.effects import Effect, get_effect, searched_kinds
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._near_bodies import (
     LOOSE,
     ExtraColumns,
@@ -26,6 +26,7 @@ from skidyn.measurement._near_bodies import (
     NearBodies,
     likely_load,
 )
+from skidyn.measurement._reading import Reading
 
 #: Number of effects that are examined in detail.
 FINALISTS = 4

@@ -15,10 +15,11 @@ from functools import cache
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import Fits, Reading, friction
+from skidyn.measurement._fits import Fits, friction
 from skidyn.measurement._loads import by_recording
 from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies, likely_load
 from skidyn.measurement._peak import climb
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._robust import fit_admissible
 
 #: Most steps, the largest one, and the one that ends them.
@@ -150,7 +151,7 @@ def _loads(fits: Fits, near: NearBodies) -> dict[int, Array]:
     """
     size = likely_load(fits.robot)
     last = np.arange(near.n_bodies - len(size), near.n_bodies)
-    load = fits.mean_regressor(fits.robot, fits.motion(Reading()), last) * size
+    load = fits.mean_regressor(fits.robot, Reading().motion(fits.signals), last) * size
     return {j: by_recording(load[:, j], fits.recording) for j in near.joints}
 
 
@@ -204,7 +205,7 @@ def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
 def known_gains(fits: Fits, reading: Reading = AS_IT_IS) -> dict[int, float]:
     """Multiple of the robot's own torque, for columns of which it explains enough."""
     here = fits.nominal(reading)
-    s = fits.motion(reading)
+    s = reading.motion(fits.signals)
     known = {}
     for k in range(fits.n_joints):
         if not fits.usable(k) or not here.gain[k] > 0:

@@ -14,9 +14,10 @@ import numpy as np
 
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import duel_of
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._near_bodies import LOOSE, ExtraColumns, Factored, NearBodies
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes, readable_fits
 
@@ -85,7 +86,7 @@ def find_without_gravity(fits: Fits) -> list[tuple[int, float, float, float]]:
     fits : Fits
         Rows.
     """
-    gravity = fits.robot.gravity_torque(fits.motion(Reading()).q)
+    gravity = fits.robot.gravity_torque(Reading().motion(fits.signals).q)
     pull = fits.average(gravity)
     fits = fits.loaded()
     torque = fits.torque + gravity

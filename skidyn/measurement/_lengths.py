@@ -18,9 +18,10 @@ from skidyn._signals import Array
 from skidyn.measurement._channels import NOISELESS
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import duel_of
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._near_bodies import LOOSE, ExtraColumns, Factored, NearBodies
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
 from skidyn.robots import Robot

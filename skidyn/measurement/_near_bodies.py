@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import Fits, Reading, friction
+from skidyn.measurement._fits import Fits, friction
 from skidyn.measurement._loads import LOAD, by_recording, n_loads
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._robust import FREEDOM, student
 from skidyn.robots import Robot
 
@@ -83,13 +84,13 @@ class NearBodies:
         robot = fits.robot
         if reading.gravity is not None:
             robot = replace(robot, gravity=np.asarray(reading.gravity))
-        self.fits, self.signals = fits, fits.motion(reading).with_(robot=robot)
+        self.fits, self.signals = fits, reading.motion(fits.signals).with_(robot=robot)
         self.gains = gains
         stated = np.asarray(robot.inertial_parameters, dtype=float).ravel()
         every = np.arange(stated.size)
         regressor = fits.mean_regressor(robot, self.signals, every)
         size = sizes(robot)
-        read = [fits.torque_column(reading, j) for j in range(fits.n_joints)]
+        read = [reading.torque_column(j) for j in range(fits.n_joints)]
         self.joints = [j for j, (column, _) in enumerate(read) if fits.usable(column)]
         self.inflation = [float(inflation[read[j][0]]) for j in self.joints]
         number = fits.recording if fits.loads else 0 * fits.recording

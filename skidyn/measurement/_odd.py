@@ -14,11 +14,12 @@ from skidyn._signals import Array
 from skidyn.measurement._bodies import Explained, explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._gains import USUAL
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd_order import find_exchanges
 from skidyn.measurement._peak import climb
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._robust import robust_likelihood, student
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_gain

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._gains import CLEARLY, USUAL, known_gains
 from skidyn.measurement._peak import climb, peak
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, MOST_ROWS
 from skidyn.measurement._robust import ROUNDS
 

@@ -12,8 +12,10 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn.measurement._duel import fight
-from skidyn.measurement._fits import Fits, Outcome, Reading, friction
+from skidyn.measurement._fits import Fits, friction
+from skidyn.measurement._outcome import Outcome
 from skidyn.measurement._peak import climb, peak
+from skidyn.measurement._reading import Reading
 from skidyn.robots import Robot
 
 #: Least log-likelihood gain of a change, corrected for the correlation of neighbouring rows.
@@ -417,7 +419,7 @@ def _is_all(fits: Fits, change: Change, identified: Outcome) -> bool:
     Bodies that are not those stated look like another zero of their joint, but leave more.
     """
     (joint,) = change.joints
-    column, _ = fits.torque_column(change.reading, joint)
+    column, _ = change.reading.torque_column(joint)
     left = float(identified.margin(fits.nominal(change.reading))[column])
     return left <= UNEXPLAINED * change.gain
 
@@ -437,7 +439,7 @@ def _all_gain(fits: Fits, change: Change, reading: Reading, here: Outcome) -> bo
         column
         for j in range(fits.n_joints)
         if _columns(fits, change.reading, j) != _columns(fits, reading, j)
-        and fits.usable(column := fits.torque_column(change.reading, j)[0])
+        and fits.usable(column := change.reading.torque_column(j)[0])
     ]
     gains = there.margin(here)[moved]
     return bool(gains.sum() >= LEAST and np.all(gains > -LEAST))
@@ -446,7 +448,7 @@ def _all_gain(fits: Fits, change: Change, reading: Reading, here: Outcome) -> bo
 def _columns(fits: Fits, reading: Reading, joint: int) -> tuple[int, int]:
     """Columns of the motion and of the torque of a joint."""
     motion = joint if reading.order is None else reading.order[joint]
-    return motion, fits.torque_column(reading, joint)[0]
+    return motion, reading.torque_column(joint)[0]
 
 
 def _drop(before: Outcome, after: Outcome) -> float:
@@ -525,7 +527,7 @@ def _orders(fits: Fits, reading: Reading) -> Iterator[Change]:
                 changed: Any = {name: wanted}
                 yield Change(name, moved, replace(reading, **changed))
             if name == "order" and wanted is not None:  # the same motion, with the torques as now
-                own = tuple(order.index(fits.torque_column(reading, j)[0]) for j in range(n))
+                own = tuple(order.index(reading.torque_column(j)[0]) for j in range(n))
                 yield Change(
                     "motion_order", moved, replace(reading, order=wanted, torque_order=own)
                 )
@@ -590,11 +592,11 @@ def _restored_gain(fits: Fits, without: Reading, reading: Reading) -> tuple[floa
 
 def fitted_gravity(fits: Fits, reading: Reading, here: Outcome) -> Array | None:
     """Gravity that explains the torque best with the bodies of the description, m/s^2."""
-    s = fits.motion(reading)
+    s = reading.motion(fits.signals)
     still, pulls = fits.gravity_parts(reading)
     blocks, targets = [], []
     for j in range(fits.n_joints):
-        column, sign = fits.torque_column(reading, j)
+        column, sign = reading.torque_column(j)
         if not fits.usable(column):
             continue
         torque, use = fits.mean_torque(column)

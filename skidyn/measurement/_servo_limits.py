@@ -28,8 +28,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import SAMPLES, Fits, Reading
+from skidyn.measurement._fits import SAMPLES, Fits
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._robust import FREEDOM, ROUNDS
 from skidyn.measurement._torque import readable_fits
 

@@ -12,9 +12,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._lengths import stretched
 from skidyn.measurement._peak import peak
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._readings import FEWEST_ROWS, MOST_ROWS
 
 #: Logarithms of the sizes that are tried, and distance of the points of a parabola.

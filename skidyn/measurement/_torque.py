@@ -12,9 +12,10 @@ from skidyn._signals import Array
 from skidyn._text import listed
 from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
-from skidyn.measurement._fits import Fits, Reading, friction
+from skidyn.measurement._fits import Fits, friction
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes, is_oblique
 from skidyn.measurement._robust import fit_admissible
 from skidyn.measurement._suspicion import Certainty, Suspicion, remedy_of
@@ -140,7 +141,7 @@ def _magnitude_gain(fits: Fits, k: int) -> float:
     """Log-likelihood gain of the magnitude of the robot's torque over the torque itself."""
     if not fits.usable(k):
         return 0.0
-    s = fits.motion(Reading())
+    s = Reading().motion(fits.signals)
     own = fits.robot.inverse_dynamics(s.q, s.dq, s.ddq)[:, k]
     y, use = fits.mean_torque(k)
     y, columns = y[use], fits.average(np.column_stack([own, friction(s, k)]))[use]

@@ -10,7 +10,7 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._bodies import explained
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._gains import (
     CLEARLY,
     USUAL,
@@ -22,6 +22,7 @@ from skidyn.measurement._gains import (
 from skidyn.measurement._joint_gravity import without_gravity
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._rate import other_rate, rate_gain
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._size import find_size
 from skidyn.measurement._suspicion import Suspicion, remedy_of
 from skidyn.measurement._torque import asked_changes, readable_fits

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn._text import trajectories_told
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._peak import climb
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._readings import FEWEST_ROWS, MOST_ROWS
 from skidyn.measurement._suspicion import Suspicion, remedy_of
 

@@ -11,11 +11,11 @@ import numpy as np
 
 from skidyn._signals import Array, Signals
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import Reading
 from skidyn.measurement._lowpass import TRIED, summit, suspect_lowpass, without_lowpass
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._measures import velocity_consistency
 from skidyn.measurement._peak import vertex
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion, remedy_of
 from skidyn.measurement._tachometer import Fault, find_fault
 from skidyn.measurement._units import (
