@@ -23,7 +23,7 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._near_bodies import NearBodies
 from skidyn.measurement._outcome import Outcome
 from skidyn.measurement._reading import Reading
-from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, HALF, MOST_ROWS, NEEDED, WEAKEST
+from skidyn.measurement._readings import DECISIVE, HALF, NEEDED, WEAKEST
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes
 from skidyn.robots import Robot
@@ -154,7 +154,7 @@ def find_axes(fits: Fits) -> list[Axis]:
     robot, tree = fits.robot, fits.robot.tree
     if len(tree.parents) != robot.n_joints:
         return []  # bodies of mimic joints have no separate columns
-    few = fits.with_loads(False).thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+    few = fits.with_loads(False).few
     rough = few.nominal(Reading(), 1)
     every = np.vstack([np.eye(3), -np.eye(3)])
     tried: list[tuple[float, int, int, Array]] = []

@@ -42,6 +42,8 @@ OWN = 4
 #: Log-likelihood that every coefficient of a load must gain on average: half the logarithm of some
 #: 150 rows, twice.
 LOADED = 5.0
+#: Rows of a first test at least, and at most over the number of joints.
+FEWEST_ROWS, MOST_ROWS = 150, 2800
 #: Number of motions whose columns are cached.
 KEPT = 2
 
@@ -125,6 +127,11 @@ class Fits:
         if step < 2:
             return self
         return self.only(np.arange(self.n_rows) % step == 0)
+
+    @property
+    def few(self) -> Fits:
+        """Few of the rows, for a first test, of which a robot with more joints needs fewer."""
+        return self.thinned(max(FEWEST_ROWS, MOST_ROWS // self.n_joints))
 
     def _anew(self, **changes: Any) -> Fits:
         """Changed rows, of which nothing has been fitted."""

@@ -27,10 +27,10 @@ from skidyn.measurement._measures import (
 )
 
 if TYPE_CHECKING:
+    from skidyn.measurement._changes import Change
     from skidyn.measurement._delay import Delay
     from skidyn.measurement._divided import Division
     from skidyn.measurement._fits import Fits
-    from skidyn.measurement._readings import Change
     from skidyn.measurement._servo_limits import Servo
     from skidyn.robots import Robot
 

@@ -12,7 +12,7 @@ from skidyn.measurement._fits import Fits
 from skidyn.measurement._gains import CLEARLY, USUAL, known_gains
 from skidyn.measurement._peak import climb, peak
 from skidyn.measurement._reading import Reading
-from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, MOST_ROWS
+from skidyn.measurement._readings import DECISIVE
 from skidyn.measurement._robust import ROUNDS
 
 #: Least log-likelihood gain of another rate, and its value where the scales of torques are usual.
@@ -37,7 +37,7 @@ def other_rate(fits: Fits, odd: bool) -> float | None:
     the scales of some torques are odd, it must make all of them usual, or identified bodies,
     which have no scale, must confirm it.
     """
-    few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+    few = fits.few
     best, log = max((rate_gain(few, rate, 1), float(np.log(rate))) for rate in RATES)
     if best < LEAST and not odd:
         return None

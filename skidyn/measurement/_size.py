@@ -16,7 +16,6 @@ from skidyn.measurement._fits import Fits
 from skidyn.measurement._lengths import stretched
 from skidyn.measurement._peak import peak
 from skidyn.measurement._reading import Reading
-from skidyn.measurement._readings import FEWEST_ROWS, MOST_ROWS
 
 #: Logarithms of the sizes that are tried, and distance of the points of a parabola.
 TRIED, NEAR = np.linspace(-0.5, 0.5, 21), 0.01
@@ -38,7 +37,7 @@ def find_size(fits: Fits, factors: Mapping[int, float]) -> tuple[float, float] |
         Factors of torques, by joint from 0.
     """
     bodies = np.flatnonzero(fits.robot.tree.parents >= 0).tolist()
-    few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+    few = fits.few
 
     def sized(rows: Fits, log: float) -> Fits:
         return rows.of(stretched(rows.robot, bodies, np.full(len(bodies), log)))

@@ -10,13 +10,14 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn._text import listed
+from skidyn.measurement._changes import Change, is_oblique
 from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._fits import Fits, friction
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
 from skidyn.measurement._reading import Reading
-from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes, is_oblique
+from skidyn.measurement._readings import DECISIVE, HALF, find_changes
 from skidyn.measurement._robust import fit_admissible
 from skidyn.measurement._suspicion import Certainty, Suspicion, remedy_of
 

@@ -15,7 +15,6 @@ from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._peak import climb
 from skidyn.measurement._reading import Reading
-from skidyn.measurement._readings import FEWEST_ROWS, MOST_ROWS
 from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 DEGREE = np.pi / 180
@@ -368,7 +367,7 @@ def _identified_size(
     fits: Fits, sizes: Array, joints: frozenset[int] | None
 ) -> tuple[float, float]:
     """Factor of positions at which identified bodies fit best, and its gain over far ones."""
-    few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints)).with_loads()
+    few = fits.few.with_loads()
     fitted = [few.identified(_sized(x, joints)) for x in sizes]
     likely = np.array([outcome.likelihood.sum() for outcome in fitted])
     best = int(np.argmax(likely))
