@@ -45,10 +45,15 @@ def add_parser(commands: Any) -> None:
         DESCRIPTION,
     )
     parser.add_argument("--robot", default="panda", help="embedded robot (default: %(default)s)")
-    parser.add_argument("--effect", default="dahl", help="kind, or none (default: %(default)s)")
+    parser.add_argument(
+        "--effect", default="dahl", help="kind of the effect, or none (default: %(default)s)"
+    )
     with_joints(parser, "joints with the effect (default: a suitable choice)")
     parser.add_argument(
-        "--noise", default="low", choices=("low", "high"), help="of torques (default: %(default)s)"
+        "--noise",
+        default="low",
+        choices=("low", "high"),
+        help="noise of the torques (default: %(default)s)",
     )
     parser.add_argument(
         "--seed", type=int, default=0, help="seed of all random numbers (default: 0)"
@@ -80,7 +85,10 @@ def add_parser(commands: Any) -> None:
         "trajectories (default: %(default)s)",
     )
     along.add_argument(
-        "--engine", default="own", choices=("own", "mujoco"), help="default: %(default)s"
+        "--engine",
+        default="own",
+        choices=("own", "mujoco"),
+        help="simulator of the motion (default: %(default)s)",
     )
     with_controller(
         along, "drive the model by the commanded positions of the log instead of its torque"

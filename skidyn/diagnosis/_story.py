@@ -329,7 +329,7 @@ def sure(finding: Finding) -> str:
     elif finding.kind == "unknown":
         text = "no effect of the catalogue explains it"
     elif is_setting(finding):
-        text = "the torque that the motion requires shows it"
+        text = "the torque that the motion requires is the evidence for it"
     elif not text:
         text = "no other effect explains it as well"
     return text
