@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 SIGN_BLUR = 0.003
 #: A time step longer than this many median steps is a gap.
 GAP_STEPS = 5.0
+#: Standard deviation of a normal distribution over the median of its absolute values.
+MAD = 1.4826
 
 
 def find_segments(trajectory: NDArray[Any], time: Array | None = None) -> list[slice]:
@@ -42,6 +44,15 @@ def find_segments(trajectory: NDArray[Any], time: Array | None = None) -> list[s
         ]
         edges = np.unique(np.concatenate([edges, *gaps])).tolist()
     return [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+
+def scatter(values: Array, axis: int | None = None) -> Any:
+    """Standard deviation around zero of normal values among which there are outliers.
+
+    >>> round(float(scatter(np.array([-1.0, 0.5, 1.0, 90.0]))), 4)
+    1.4826
+    """
+    return MAD * np.median(np.abs(values), axis=axis)
 
 
 def runs_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array
+from skidyn._signals import Array, scatter
 from skidyn.measurement._check import Check
 from skidyn.measurement._crosstalk import find_shares
 from skidyn.measurement._fits import Fits, lines_between
@@ -293,4 +293,4 @@ class ComputedTorque(Check):
 
 
 def _spread(values: Array) -> float:
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    return float(scatter(values - np.median(values)))

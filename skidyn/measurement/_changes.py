@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from skidyn._signals import Array
+from skidyn._signals import Array, scatter
 from skidyn.measurement._fits import Fits, friction
 from skidyn.measurement._outcome import Outcome
 from skidyn.measurement._reading import Reading
@@ -203,6 +203,6 @@ def fitted_gravity(fits: Fits, reading: Reading, here: Outcome) -> Array | None:
         scaled = a * np.sqrt(weight)[:, None]
         gravity = np.linalg.lstsq(scaled, y * np.sqrt(weight), rcond=1e-6)[0]
         r = y - a @ gravity
-        spread = 1.4826 * float(np.median(np.abs(r))) + 1e-12
+        spread = float(scatter(r)) + 1e-12
         weight = 1 / np.maximum(1.0, np.abs(r) / (1.5 * spread))
     return np.asarray(gravity)

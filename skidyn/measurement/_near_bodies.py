@@ -15,7 +15,7 @@ from skidyn._signals import Array
 from skidyn.measurement._fits import Fits, friction
 from skidyn.measurement._loads import LOAD, by_recording, n_loads
 from skidyn.measurement._reading import Reading
-from skidyn.measurement._robust import FREEDOM, student
+from skidyn.measurement._robust import student, student_weights
 from skidyn.robots import Robot
 
 #: Shares of a body's mass, times its length and its square for first and second moments, to which a
@@ -166,10 +166,7 @@ class NearBodies:
                 float(np.sqrt(np.mean(w * r**2))) + 1e-12
                 for w, r in zip(trust, residuals, strict=True)
             ]
-            trust = [
-                (FREEDOM + 1) / (FREEDOM + (r / s) ** 2)
-                for r, s in zip(residuals, scales, strict=True)
-            ]
+            trust = [student_weights(r, s) for r, s in zip(residuals, scales, strict=True)]
         alike = [
             student(r, s) / i for r, s, i in zip(residuals, scales, self.inflation, strict=True)
         ]

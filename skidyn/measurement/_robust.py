@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from skidyn._signals import Array
+from skidyn._signals import Array, scatter
 
 #: Degrees of freedom of the residuals, and rounds of the fit.
 FREEDOM, ROUNDS = 4.0, 5
@@ -62,7 +62,7 @@ def fit_admissible(columns: Array, y: Array, rounds: int = ROUNDS) -> RobustFit:
         coefficients = _not_negative(gram[None], (weighted.T @ z)[None])[0]
         residual = z - b @ coefficients
         scale = float(np.sqrt(np.mean(weight * residual**2))) + 1e-12
-        weight = (FREEDOM + 1) / (FREEDOM + (residual / scale) ** 2)
+        weight = student_weights(residual, scale)
     return RobustFit(coefficients / size, scale, residual, student(residual, scale))
 
 
@@ -175,13 +175,16 @@ def fit_together(
             float(np.sqrt(np.mean(w * r**2))) + 1e-12
             for w, r in zip(weights, residuals, strict=True)
         ]
-        weights = [
-            (FREEDOM + 1) / (FREEDOM + (r / s) ** 2) for r, s in zip(residuals, scales, strict=True)
-        ]
+        weights = [student_weights(r, s) for r, s in zip(residuals, scales, strict=True)]
     return [
         RobustFit(coefficients[place] / size[place], s, r, student(r, s))
         for place, r, s in zip(places, residuals, scales, strict=True)
     ]
+
+
+def student_weights(residual: Array, scale: float) -> Array:
+    """Weights of residuals under Student's t, close to one for those within their scale."""
+    return (FREEDOM + 1) / (FREEDOM + (residual / scale) ** 2)
 
 
 def student(residual: Array, scale: float) -> float:
@@ -207,14 +210,14 @@ def gains_of(before: Sequence[RobustFit], after: Sequence[RobustFit]) -> list[fl
 
 def robust_weights(fit: RobustFit) -> Array:
     """Weight of every row of a robust fit, over the square of its scale."""
-    return (FREEDOM + 1) / (FREEDOM + (fit.residual / fit.scale) ** 2) / fit.scale**2
+    return student_weights(fit.residual, fit.scale) / fit.scale**2
 
 
 def robust_likelihood(residual: Array) -> float:
     """Log-likelihood of residuals at approximately the best scale."""
     scale = float(np.std(residual)) + 1e-12
     for _ in range(ROUNDS):
-        weight = (FREEDOM + 1) / (FREEDOM + (residual / scale) ** 2)
+        weight = student_weights(residual, scale)
         scale = float(np.sqrt(np.mean(weight * residual**2))) + 1e-12
     return student(residual, scale)
 
@@ -224,7 +227,7 @@ def _inflation(residual: Array) -> float:
     if len(residual) < FEWEST:
         return 1.0
     r = residual - np.median(residual)
-    r = np.clip(r, *(np.array([-3, 3]) * (1.4826 * np.median(np.abs(r)) + 1e-300)))
+    r = np.clip(r, *(np.array([-3, 3]) * (scatter(r) + 1e-300)))
     alike = float(r[1:] @ r[:-1] / (r @ r)) if r @ r > 0 else 0.0
     alike = float(np.clip(alike, 0.0, MOST_ALIKE))
     return (1 + alike) / (1 - alike)

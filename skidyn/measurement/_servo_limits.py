@@ -31,7 +31,7 @@ from skidyn._signals import Array
 from skidyn.measurement._fits import SAMPLES, Fits
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._reading import Reading
-from skidyn.measurement._robust import FREEDOM, ROUNDS
+from skidyn.measurement._robust import ROUNDS, student_weights
 from skidyn.measurement._torque import readable_fits
 
 #: Share of rows that are certainly below a limit at first, and share of a limit that is later.
@@ -272,5 +272,5 @@ def _multiple(columns: Array, torque: Array) -> tuple[float, float]:
         x = np.linalg.lstsq(columns * root[:, None], torque * root, rcond=1e-9)[0]
         residual = torque - columns @ x
         scale = np.sqrt(np.mean(weight * residual**2)) + 1e-300
-        weight = (FREEDOM + 1) / (FREEDOM + (residual / scale) ** 2)
+        weight = student_weights(residual, float(scale))
     return float(x[0]), float(scale**2 / max(np.var(torque), 1e-300))
