@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._duel import fight
+from skidyn.measurement._duel import Duel, fight
 from skidyn.measurement._fits import Fits, Outcome, Reading, friction
 from skidyn.measurement._peak import peak
 from skidyn.robots import Robot
@@ -182,6 +183,11 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         restored_change = _restored(fits, reading, here)
         if restored_change is not None:
             return restored_change
+
+    @cache
+    def fought(other: Reading, joints: tuple[int, ...]) -> Duel:
+        return fight(fits, reading, other, joints)
+
     accepted = []
     for change in judged:
         if change.kind == "no_gravity":
@@ -205,7 +211,8 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
     while accepted:
         best = _turned(fits, _first(accepted), accepted)
-        held = _against_effects(fits, reading, here, best)
+        most = int(np.argmax(fits.nominal(best.reading).margin(here)))
+        held = _against_effects(fought(best.reading, best.joints or (most,)), best)
         if held is not None:
             return held
         accepted.remove(best)
@@ -215,7 +222,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
     for change in turned:
         angle = abs(change.reading.zero[-1][1])
         if change.drop >= MOSTLY and angle >= NOTED:
-            return _or_bodies(fits, reading, change)
+            return _or_bodies(fought(change.reading, change.joints), change)
     return None
 
 
@@ -338,10 +345,8 @@ def _upright(gravity: Sequence[float] | None) -> bool:
     return gravity is not None and float(np.max(np.abs(gravity))) > UPRIGHT * GRAVITY
 
 
-def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change) -> Change | None:
+def _against_effects(duel: Duel, change: Change) -> Change | None:
     """The change with its alternatives; None if an effect, or other bodies, explain it."""
-    most = int(np.argmax(fits.nominal(change.reading).margin(here)))
-    duel = fight(fits, reading, change.reading, change.joints or (most,))
     if min(duel.gain, duel.beside) >= LEAST and duel.beside >= BESIDE * duel.gain:
         return change
     if duel.gain < LEAST and duel.rival < LEAST and duel.gain > 0:
@@ -351,12 +356,11 @@ def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change
     return replace(change, other=duel.effect)
 
 
-def _or_bodies(fits: Fits, reading: Reading, zero: Change) -> Change | None:
+def _or_bodies(duel: Duel, zero: Change) -> Change | None:
     """A zero that explains nearly all, beside other bodies or a load, which do so as well.
 
     They turn the direction of the weight on a last joint as another zero does.
     """
-    duel = fight(fits, reading, zero.reading, zero.joints)
     other = duel.effect or OTHER_BODIES
     return replace(zero, other=other, rival_gains=True) if duel.gain > 0 else None
 
