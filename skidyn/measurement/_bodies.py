@@ -241,9 +241,11 @@ class TorqueScale(Check):
             low, high = CLEARLY if k in known else USUAL
             if low <= gain <= high or (k not in known and gain < low):
                 continue  # the multiple of a torque that bodies hardly explain is small by itself
-            own, gained, apart = joint_gain(fits.loaded(), k, gain)
+            own, gained = joint_gain(fits.loaded(), k, gain)
             wrong = not USUAL[0] <= gain <= USUAL[1] and k in known
-            if gained > (LEAST if wrong else SURE) and apart > LEAST and not low <= own <= high:
+            sure = gained > (LEAST if wrong else SURE) and not low <= own <= high
+            far_off = (scale_gain(fits.loaded(), k, times * own) for times in (0.25, 4.0))
+            if sure and gained - max(far_off) > LEAST:
                 found[k] = own
             elif wrong and gained > 0 and k not in far:
                 yield self.suspicion(
@@ -394,7 +396,17 @@ def _unit_like(gain: float) -> float | None:
     return next((f for f in UNITS if abs(np.log(gain / f)) < 0.3), None)
 
 
-def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
+def scale_gain(fits: Fits, k: int, gain: float) -> float:
+    """Log-likelihood gain of another scale of one torque, with bodies that all joints share."""
+    other = fits.scaled({k: gain}).identified(Reading())
+    # the density of a torque is that of the scaled torque divided by the gain
+    change = other.margin(fits.identified(Reading()))
+    rows = float(fits.moving[:, k].sum())
+    change[k] -= rows * np.log(gain) / max(other.inflation_of(k), 1.0)
+    return float(change.sum())
+
+
+def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float]:
     """Scale of one torque at which identified bodies, which all joints share, explain it best.
 
     Parameters
@@ -408,22 +420,13 @@ def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
 
     Returns
     -------
-    gain, gained, apart : float
-        Scale, its log-likelihood gain over none, and over one four times as large or as small.
+    gain, gained : float
+        Scale, and its log-likelihood gain over none.
     """
-    plain = fits.identified(Reading())
-    rows = float(fits.moving[:, k].sum())
-
-    def gained(log: float) -> float:
-        other = fits.scaled({k: float(np.exp(log))}).identified(Reading())
-        # the density of a torque is that of the scaled torque divided by the gain
-        change = other.margin(plain)
-        change[k] -= rows * log / max(other.inflation_of(k), 1.0)
-        return float(change.sum())
 
     @cache  # a search comes back to where it was
     def at(place: int) -> float:
-        return gained(np.log(gain) + 0.01 * place)
+        return scale_gain(fits, k, float(np.exp(np.log(gain) + 0.01 * place)))
 
     step = 8  # maxima are narrow if the noise is small
     best, place = max((at(x), x) for x in range(-5 * step, 6 * step, step))
@@ -433,9 +436,7 @@ def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
             best, place = near, other
         else:
             step //= 2
-    log = np.log(gain) + 0.01 * place
-    far = max(gained(log + x) for x in (-np.log(4), np.log(4)))
-    return float(np.exp(log)), best, best - far
+    return float(np.exp(np.log(gain) + 0.01 * place)), best
 
 
 def _known_gains(fits: Fits, reading: Reading = AS_IT_IS) -> dict[int, float]:
