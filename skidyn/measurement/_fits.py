@@ -175,7 +175,9 @@ class Fits:
     _rubbed: dict[Reading, list[Array]] = field(default_factory=dict, repr=False)
     _carried: dict[tuple[Reading, int], Array] = field(default_factory=dict, repr=False)
     _parts: dict[Reading, tuple[Array, Array]] = field(default_factory=dict, repr=False)
-    _fitted: dict[tuple[Any, ...], RobustFit] = field(default_factory=dict, repr=False)
+    _fitted: dict[tuple[Reading, int], dict[tuple[int, int, float], RobustFit]] = field(
+        default_factory=dict, repr=False
+    )
     _felt: dict[Reading, list[tuple[Array, NDArray[np.int64]]]] = field(
         default_factory=dict, repr=False
     )
@@ -337,7 +339,8 @@ class Fits:
         self, motion: Reading, read: Sequence[tuple[int, int, float]], rounds: int
     ) -> list[RobustFit]:
         """Fits of joints to columns of the torque; readings share most of these fits."""
-        new = [key for key in read if (motion, *key, rounds) not in self._fitted]
+        known = self._fitted.setdefault((motion, rounds), {})
+        new = [key for key in read if key not in known]
         if new:
             joints, columns, signs = (np.array(x) for x in zip(*new, strict=True))
             own = self.columns(motion)[:, :, joints].transpose(2, 0, 1)
@@ -351,9 +354,8 @@ class Fits:
                     fit_admissible(a[w], t[w], rounds) for a, t, w in zip(own, y, use, strict=True)
                 ]
             )
-            for key, fit in zip(new, found, strict=True):
-                self._fitted[motion, *key, rounds] = fit
-        return [self._fitted[motion, *key, rounds] for key in read]
+            known.update(zip(new, found, strict=True))
+        return [known[key] for key in read]
 
     def _beside_loads(
         self,
