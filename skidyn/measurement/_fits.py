@@ -543,7 +543,7 @@ class Fits:
         for j, (column, sign) in enumerate(self.torque_column(reading, j) for j in range(len(own))):
             if self.usable(column, 1):
                 y, use = self.mean_torque(column)
-                predicted = rigid[:, j] + self._own_columns(s, j) @ own[j]
+                predicted = rigid[:, j] + self._own_columns(reading, s, j) @ own[j]
                 left[column] = sign * y[use] - predicted[use]
         return left
 
@@ -553,9 +553,10 @@ class Fits:
             return self.robot
         return replace(self.robot, gravity=np.asarray(reading.gravity))
 
-    def _own_columns(self, s: Signals, joint: int) -> Array:
+    def _own_columns(self, motion: Reading, s: Signals, joint: int) -> Array:
         """Mean columns of a joint in addition to those of the bodies, shape (n_rows, OWN)."""
-        return self.average(np.column_stack([friction(s, joint), np.ones(len(s.q))]))
+        rubs = [column[:, joint] for column in self._friction(motion, s)]
+        return np.column_stack([*rubs, np.ones(self.n_rows)])
 
     def _designs(
         self, reading: Reading
@@ -585,14 +586,15 @@ class Fits:
         if motion not in self._felt:
             self._felt.clear()
             robot, s = self._robot(motion), self.motion(motion)
-            base, rubs = base_parameter_index(robot), self._unstretched(motion, s)
+            base = base_parameter_index(robot)
             last = 10 * robot.n_bodies + LOAD if self.loads else LOAD[:0]
             regressor = self.mean_regressor(robot, s, np.append(base, last))
             number, found = s.trajectory[::SAMPLES], []
             first = len(base) + OWN * self.n_joints
             for j in range(self.n_joints):
                 felt = np.flatnonzero(regressor[:, j, : len(base)].any(axis=0))  # moved bodies
-                columns = np.hstack([regressor[:, j][:, felt], self._own_columns(rubs, j)])
+                own = self._own_columns(motion, s, j)
+                columns = np.hstack([regressor[:, j][:, felt], own])
                 place = np.append(felt, len(base) + OWN * j + np.arange(OWN))
                 carried = by_recording(regressor[:, j, len(base) :], number)
                 if carried.size and regressor[:, j, len(base) :].any():
