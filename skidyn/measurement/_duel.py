@@ -96,6 +96,8 @@ def duel_of(
     plain = here.plain.posterior
     gain = there.plain.posterior - plain
     duel = Duel(gain, gain)
+    if gain <= 0:
+        return duel  # effects only make it smaller
     for effect, columns, cost in _likely(here, joints, but=but):
         with_it = here.fit(columns).posterior
         rival = with_it - cost - plain

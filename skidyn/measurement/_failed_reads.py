@@ -134,8 +134,8 @@ def _placed(values: Array, trajectory: NDArray[np.int64]) -> dict[float, NDArray
     held, before, after = values[begins], values[begins - 1], values[ends]
     jump = np.minimum(np.abs(held - before), np.abs(held - after))
     away = jump > AWAY * np.abs(after - before)
-    if not away.any():
-        return {}
+    if np.unique(held[away], return_counts=True)[1].max(initial=0) < FEWEST:
+        return {}  # no value comes often enough
     near = np.zeros(len(values), dtype=int)
     near[begins[away] - 1] += 1  # the step to the value and all steps until the one from it
     near[ends[away]] -= 1

@@ -97,7 +97,9 @@ class Fits:
     _rubbed: dict[Reading, list[Array]] = field(default_factory=dict, repr=False)
     _carried: dict[tuple[Reading, int], Array] = field(default_factory=dict, repr=False)
     _parts: dict[Reading, tuple[Array, Array]] = field(default_factory=dict, repr=False)
-    _fitted: dict[tuple[Any, ...], RobustFit] = field(default_factory=dict, repr=False)
+    _fitted: dict[tuple[Reading, int], dict[tuple[int, int, float], RobustFit]] = field(
+        default_factory=dict, repr=False
+    )
     _felt: dict[Reading, list[tuple[Array, NDArray[np.int64]]]] = field(
         default_factory=dict, repr=False
     )
@@ -239,7 +241,8 @@ class Fits:
         self, motion: Reading, read: Sequence[tuple[int, int, float]], rounds: int
     ) -> list[RobustFit]:
         """Fits of joints to columns of the torque; readings share most of these fits."""
-        new = [key for key in read if (motion, *key, rounds) not in self._fitted]
+        known = self._fitted.setdefault((motion, rounds), {})
+        new = [key for key in read if key not in known]
         if new:
             joints, columns, signs = (np.array(x) for x in zip(*new, strict=True))
             own = self.columns(motion)[:, :, joints].transpose(2, 0, 1)
@@ -253,9 +256,8 @@ class Fits:
                     fit_admissible(a[w], t[w], rounds) for a, t, w in zip(own, y, use, strict=True)
                 ]
             )
-            for key, fit in zip(new, found, strict=True):
-                self._fitted[motion, *key, rounds] = fit
-        return [self._fitted[motion, *key, rounds] for key in read]
+            known.update(zip(new, found, strict=True))
+        return [known[key] for key in read]
 
     def _beside_loads(
         self,
@@ -444,7 +446,7 @@ class Fits:
         for j, (column, sign) in enumerate(reading.torque_column(j) for j in range(len(own))):
             if self.usable(column, 1):
                 y, use = self.mean_torque(column)
-                predicted = rigid[:, j] + self._own_columns(s, j) @ own[j]
+                predicted = rigid[:, j] + self._own_columns(reading, s, j) @ own[j]
                 left[column] = sign * y[use] - predicted[use]
         return left
 
@@ -454,9 +456,10 @@ class Fits:
             return self.robot
         return replace(self.robot, gravity=np.asarray(reading.gravity))
 
-    def _own_columns(self, s: Signals, joint: int) -> Array:
+    def _own_columns(self, motion: Reading, s: Signals, joint: int) -> Array:
         """Mean columns of a joint in addition to those of the bodies, shape (n_rows, OWN)."""
-        return self.average(np.column_stack([friction(s, joint), np.ones(len(s.q))]))
+        rubs = [column[:, joint] for column in self._friction(motion, s)]
+        return np.column_stack([*rubs, np.ones(self.n_rows)])
 
     def _designs(
         self, reading: Reading
@@ -486,14 +489,15 @@ class Fits:
         if motion not in self._felt:
             self._felt.clear()
             robot, s = self._robot(motion), motion.motion(self.signals)
-            base, rubs = base_parameter_index(robot), self._unstretched(motion, s)
+            base = base_parameter_index(robot)
             last = 10 * robot.n_bodies + LOAD if self.loads else LOAD[:0]
             regressor = self.mean_regressor(robot, s, np.append(base, last))
             found = []
             first = len(base) + OWN * self.n_joints
             for j in range(self.n_joints):
                 felt = np.flatnonzero(regressor[:, j, : len(base)].any(axis=0))  # moved bodies
-                columns = np.hstack([regressor[:, j][:, felt], self._own_columns(rubs, j)])
+                own = self._own_columns(motion, s, j)
+                columns = np.hstack([regressor[:, j][:, felt], own])
                 place = np.append(felt, len(base) + OWN * j + np.arange(OWN))
                 carried = by_recording(regressor[:, j, len(base) :], self.recording)
                 if carried.size and regressor[:, j, len(base) :].any():

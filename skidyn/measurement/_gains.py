@@ -163,7 +163,17 @@ def _rounded(factor: float, error: float) -> float:
     return float(f"{best:.6g}" if within else f"{factor:.4g}")
 
 
-def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
+def scale_gain(fits: Fits, k: int, gain: float) -> float:
+    """Log-likelihood gain of another scale of one torque, with bodies that all joints share."""
+    other = fits.scaled({k: gain}).identified(Reading())
+    # the density of a torque is that of the scaled torque divided by the gain
+    change = other.margin(fits.identified(Reading()))
+    rows = float(fits.moving[:, k].sum())
+    change[k] -= rows * np.log(gain) / other.inflation_of(k)
+    return float(change.sum())
+
+
+def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float]:
     """Scale of one torque at which identified bodies, which all joints share, explain it best.
 
     Parameters
@@ -177,29 +187,18 @@ def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float, float]:
 
     Returns
     -------
-    gain, gained, apart : float
-        Scale, its log-likelihood gain over none, and over one four times as large or as small.
+    gain, gained : float
+        Scale, and its log-likelihood gain over none.
     """
-    plain = fits.identified(Reading())
-    rows = float(fits.moving[:, k].sum())
-
-    def gained(log: float) -> float:
-        other = fits.scaled({k: float(np.exp(log))}).identified(Reading())
-        # the density of a torque is that of the scaled torque divided by the gain
-        change = other.margin(plain)
-        change[k] -= rows * log / other.inflation_of(k)
-        return float(change.sum())
 
     @cache  # a search comes back to where it was
     def at(place: float) -> float:
-        return gained(np.log(gain) + 0.01 * place)
+        return scale_gain(fits, k, float(np.exp(np.log(gain) + 0.01 * place)))
 
     step = 8  # maxima are narrow if the noise is small
     first = max(range(-5 * step, 6 * step, step), key=lambda place: (at(place), place))
     place, best = climb(at, first, step, 0.5)
-    log = np.log(gain) + 0.01 * place
-    far = max(gained(log + x) for x in (-np.log(4), np.log(4)))
-    return float(np.exp(log)), best, best - far
+    return float(np.exp(np.log(gain) + 0.01 * place)), best
 
 
 def known_gains(fits: Fits, reading: Reading = AS_IT_IS) -> dict[int, float]:

@@ -17,7 +17,7 @@ from skidyn.measurement._measures import (
     RECURS,
     STRIDE,
     is_held,
-    position_step,
+    step_of_values,
 )
 from skidyn.measurement._placeholder import placeholder_remedy
 from skidyn.measurement._suspicion import Suspicion, remedy_of
@@ -78,10 +78,11 @@ def _comes_in_steps(values: Array) -> bool:
     changes = changes[changes > 0]
     if not len(changes):
         return True
-    step = position_step(values)
+    distinct = np.unique(values)
+    step = step_of_values(distinct)
     if np.isfinite(step) and np.median(changes) < CATCHES * step:
         return True
-    return len(np.unique(values)) < RECURS * len(changes)
+    return len(distinct) < RECURS * len(changes)
 
 
 def _accelerates(position: Array) -> NDArray[np.bool_]:
@@ -110,10 +111,10 @@ class HeldVelocity(Check):
             q, dq = s.q[:, k], s.dq[:, k]
             # the velocity of a joint at rest, or at constant speed, does not change
             moved = together & (q[1:] != q[:-1]) & (dq[1:] != 0) & _accelerates(q)
-            if not measurement.excited[k] or moved.sum() < 50 or _comes_in_steps(dq):
-                continue  # a constant one, too
+            if not measurement.excited[k] or moved.sum() < 50:
+                continue
             share = float(np.mean(dq[1:][moved] == dq[:-1][moved]))
-            if share > HELD:
+            if share > HELD and not _comes_in_steps(dq):  # nor is it constant
                 shares[k] = share
         if shares:
             names = measurement.joints(shares)

@@ -79,6 +79,8 @@ def is_repeated(position: np.ndarray, velocity: np.ndarray, trajectory: np.ndarr
     """Rows in which no position changes although some joint moves, as a mask."""
     again = np.zeros(len(position), dtype=bool)
     same = np.all(position[1:] == position[:-1], axis=1) & (trajectory[1:] == trajectory[:-1])
+    if not same.any():
+        return again
     # a velocity that never changes was not measured
     fast = np.where(np.ptp(velocity, axis=0) > 0, 0.02 * np.abs(velocity).max(axis=0), np.inf)
     moving = np.any(np.abs(velocity[1:]) > fast, axis=1)

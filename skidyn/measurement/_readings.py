@@ -5,11 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from skidyn.measurement._changes import Change, alternatives, fitted_gravity, is_upright
-from skidyn.measurement._duel import fight
+from skidyn.measurement._duel import Duel, fight
 from skidyn.measurement._fits import Fits
 from skidyn.measurement._outcome import Outcome
 from skidyn.measurement._peak import climb, peak
@@ -126,6 +127,11 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         restored_change = _restored(fits, reading, here)
         if restored_change is not None:
             return restored_change
+
+    @cache
+    def fought(other: Reading, joints: tuple[int, ...]) -> Duel:
+        return fight(fits, reading, other, joints)
+
     accepted = []
     for change in judged:
         if change.kind == "no_gravity":
@@ -149,7 +155,8 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
     while accepted:
         best = _turned(fits, _first(accepted), accepted)
-        held = _against_effects(fits, reading, here, best)
+        most = int(np.argmax(fits.nominal(best.reading).margin(here)))
+        held = _against_effects(fought(best.reading, best.joints or (most,)), best)
         if held is not None:
             return held
         accepted.remove(best)
@@ -159,7 +166,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
     for change in turned:
         angle = abs(change.reading.zero[-1][1])
         if change.drop >= MOSTLY and angle >= NOTED:
-            return _or_bodies(fits, reading, change)
+            return _or_bodies(fought(change.reading, change.joints), change)
     return None
 
 
@@ -272,10 +279,8 @@ def _but_for_angle(change: Change, zero: Change) -> bool:
     return is_upright(change.reading.gravity) and change.untuned > zero.untuned - TIED
 
 
-def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change) -> Change | None:
+def _against_effects(duel: Duel, change: Change) -> Change | None:
     """The change with its alternatives; None if an effect, or other bodies, explain it."""
-    most = int(np.argmax(fits.nominal(change.reading).margin(here)))
-    duel = fight(fits, reading, change.reading, change.joints or (most,))
     if min(duel.gain, duel.beside) >= LEAST and duel.beside >= BESIDE * duel.gain:
         return change
     if duel.gain < LEAST and duel.rival < LEAST and duel.gain > 0:
@@ -285,12 +290,11 @@ def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change
     return replace(change, other=duel.effect)
 
 
-def _or_bodies(fits: Fits, reading: Reading, zero: Change) -> Change | None:
+def _or_bodies(duel: Duel, zero: Change) -> Change | None:
     """A zero that explains nearly all, beside other bodies or a load, which do so as well.
 
     They turn the direction of the weight on a last joint as another zero does.
     """
-    duel = fight(fits, reading, zero.reading, zero.joints)
     other = duel.effect or OTHER_BODIES
     return replace(zero, other=other, rival_gains=True) if duel.gain > 0 else None
 

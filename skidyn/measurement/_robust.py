@@ -23,6 +23,8 @@ from skidyn._signals import Array, scatter
 
 #: Degrees of freedom of the residuals, and rounds of the fit.
 FREEDOM, ROUNDS = 4.0, 5
+#: Logarithm of their density at zero, with a scale of one.
+DENSITY = lgamma((FREEDOM + 1) / 2) - lgamma(FREEDOM / 2) - np.log(FREEDOM * np.pi) / 2
 #: Largest correlation of neighbouring rows: the residual of slightly wrong bodies is correlated
 #: over seconds, and would make any log too short.
 MOST_ALIKE = 0.875
@@ -90,9 +92,10 @@ def fit_at_once(columns: Array, y: Array, use: NDArray[np.bool_]) -> list[Robust
     coefficients = _not_negative(gram, np.matmul(b, z[:, :, None])[:, :, 0])
     residual = z - np.matmul(coefficients[:, None], b)[:, 0]
     scale = np.sqrt(np.sum(residual**2, axis=1) / total) + 1e-12
+    parts = [r[w] for r, w in zip(residual, use, strict=True)]
     return [
-        RobustFit(c, float(s), r[w], student(r[w], float(s)))
-        for c, s, r, w in zip(coefficients / size, scale, residual, use, strict=True)
+        RobustFit(c, s, r, student(r, s))
+        for c, s, r in zip(coefficients / size, scale.tolist(), parts, strict=True)
     ]
 
 
@@ -189,9 +192,8 @@ def student_weights(residual: Array, scale: float) -> Array:
 
 def student(residual: Array, scale: float) -> float:
     """Log-likelihood of residuals under Student's t."""
-    constant = lgamma((FREEDOM + 1) / 2) - lgamma(FREEDOM / 2) - np.log(FREEDOM * np.pi) / 2
     spread = np.log1p((residual / scale) ** 2 / FREEDOM)
-    return float(len(residual) * (constant - np.log(scale)) - (FREEDOM + 1) / 2 * spread.sum())
+    return float(len(residual) * (DENSITY - np.log(scale)) - (FREEDOM + 1) / 2 * spread.sum())
 
 
 def gains_of(before: Sequence[RobustFit], after: Sequence[RobustFit]) -> list[float]:

@@ -18,6 +18,7 @@ from skidyn.measurement._gains import (
     joint_gain,
     known_gains,
     refined_scales,
+    scale_gain,
 )
 from skidyn.measurement._joint_gravity import without_gravity
 from skidyn.measurement._measurement import Measurement
@@ -148,9 +149,11 @@ class TorqueScale(Check):
             low, high = CLEARLY if k in known else USUAL
             if low <= gain <= high or (k not in known and gain < low):
                 continue  # the multiple of a torque that bodies hardly explain is small by itself
-            own, gained, apart = joint_gain(fits.loaded(), k, gain)
+            own, gained = joint_gain(fits.loaded(), k, gain)
             wrong = not USUAL[0] <= gain <= USUAL[1] and k in known
-            if gained > (LEAST if wrong else SURE) and apart > LEAST and not low <= own <= high:
+            sure = gained > (LEAST if wrong else SURE) and not low <= own <= high
+            far_off = (scale_gain(fits.loaded(), k, times * own) for times in (0.25, 4.0))
+            if sure and gained - max(far_off) > LEAST:
                 found[k] = own
             elif wrong and gained > 0 and k not in far:
                 yield self.suspicion(
