@@ -65,9 +65,7 @@ def pushed(complete):
 @pytest.fixture(scope="session", params=HIDDEN)
 def nameless(request):
     """A torque that no name fits: its log, its diagnosis, its signals and its formula."""
-    log = make_hidden_effect_log(
-        load_planar_arm(), request.param, n_trajectories=6, duration=6.0, random_state=5
-    )
+    log = make_hidden_effect_log(load_planar_arm(), request.param, random_state=5)
     variables, formula, size = HIDDEN[request.param]
     return SimpleNamespace(
         log=log,
