@@ -73,7 +73,7 @@ def test_an_effort_limit_that_the_weight_of_the_links_exceeds_is_what_is_wrong(
 def test_a_rate_that_is_wrong_in_clock_and_velocities(factor, told_of):
     robot = load_ur5()
     frame = make_hidden_effect_log(
-        robot, None, n_trajectories=4, duration=6.0, random_state=3
+        robot, None, n_trajectories=4, duration=4.0, random_state=3
     ).frame
     velocities = {f"dq{k}": frame[f"dq{k}"] / factor for k in range(1, 7)}
     told = told_of(frame.assign(time=factor * frame["time"], **velocities), robot)["torque_scale"]
@@ -97,7 +97,9 @@ def test_a_unit_beside_an_effect_as_large_as_the_torque_of_the_bodies():
 @pytest.fixture(scope="module")
 def wrist():
     robot = load_ur5()
-    return robot, make_hidden_effect_log(robot, "stribeck", n_trajectories=5, random_state=7).frame
+    return robot, make_hidden_effect_log(
+        robot, "stribeck", n_trajectories=5, duration=5.0, random_state=7
+    ).frame
 
 
 def test_a_last_joint_with_friction_alone_is_in_the_unit_of_the_one_before(wrist):
