@@ -15,7 +15,7 @@ from skidyn.logs import check_log
 def test_a_rate_that_is_wrong_in_clock_and_velocities(factor, told_of):
     robot = load_ur5()
     frame = make_hidden_effect_log(
-        robot, None, n_trajectories=4, duration=6.0, random_state=3
+        robot, None, n_trajectories=4, duration=4.0, random_state=3
     ).frame
     velocities = {f"dq{k}": frame[f"dq{k}"] / factor for k in range(1, 7)}
     told = told_of(frame.assign(time=factor * frame["time"], **velocities), robot)["torque_scale"]

@@ -59,7 +59,9 @@ def test_a_unit_beside_an_effect_as_large_as_the_torque_of_the_bodies():
 @pytest.fixture(scope="module")
 def wrist():
     robot = load_ur5()
-    return robot, make_hidden_effect_log(robot, "stribeck", n_trajectories=5, random_state=7).frame
+    return robot, make_hidden_effect_log(
+        robot, "stribeck", n_trajectories=5, duration=5.0, random_state=7
+    ).frame
 
 
 def test_a_last_joint_with_friction_alone_is_in_the_unit_of_the_one_before(wrist):

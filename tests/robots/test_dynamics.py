@@ -166,6 +166,7 @@ def test_mass_scales_torque_and_nothing_else(factor):
     )
 
 
+@pytest.mark.slow
 def test_a_thousand_joints_move_exactly(chain):
     """All about one axis: every joint carries the inertia of what follows it."""
     n = 1000
