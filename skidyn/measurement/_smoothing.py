@@ -81,7 +81,7 @@ class Turns:
     def tells(self) -> bool:
         """Whether smoothing gains, and at a width that is reported."""
         reported = WIDTHS[self.width] >= SHORTEST and self.width < len(WIDTHS) - 1
-        return reported and self.gain > WORD
+        return bool(reported) and self.gain > WORD
 
 
 class SmoothedTorque(Check):
@@ -105,13 +105,14 @@ class SmoothedTorque(Check):
         step = column_step(motion, AROUND, motion.half_width)
         index, few = motion.thinned(step)
         torque = running_mean(measurement.torque, step)[index]
-        joints, fewest = np.flatnonzero(measurement.excited), min(JOINTS, measurement.n_joints)
+        joints = np.flatnonzero(measurement.excited).tolist()
+        fewest = min(JOINTS, measurement.n_joints)
         tried = [at_turns(few, torque[:, k], k, others=False) for k in joints]
         # beside other friction, smoothing gains less
         if sum(turns is not None and turns.tells for turns in tried) < fewest:
             return
         found = {}
-        for k in joints.tolist():
+        for k in joints:
             turns = at_turns(few, torque[:, k], k)
             if turns is not None and max(turns.smoothed.max(), turns.other) > turns.step:
                 found[k] = turns
