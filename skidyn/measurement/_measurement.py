@@ -208,6 +208,11 @@ class Measurement:
         ----------
         joints : iterable of int
             Joints, counted from 0.
+
+        Returns
+        -------
+        str
+            As of :meth:`joint`, joined by commas and "and".
         """
         return listed([self.joint(int(k)) for k in joints])
 
