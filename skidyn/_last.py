@@ -7,14 +7,22 @@ from collections.abc import Callable, Sequence
 from operator import is_
 from typing import Any
 
+import numpy as np
+
 
 class LastResults:
     """The last result of each name, with the objects of which it was made."""
 
     def __init__(self) -> None:
-        self._kept: dict[str, tuple[list[Any], Any]] = {}
+        self._kept: dict[str, tuple[list[Any], list[Any], Any]] = {}
 
-    def get(self, name: str, made_of: Sequence[Any], make: Callable[[], Any]) -> Any:
+    def get(
+        self,
+        name: str,
+        made_of: Sequence[Any],
+        make: Callable[[], Any],
+        equal: Sequence[Any] = (),
+    ) -> Any:
         """Result of ``make``, computed again only if it is asked for with other objects.
 
         Parameters
@@ -25,9 +33,21 @@ class LastResults:
             All arrays on which it depends, the same objects if it has not changed.
         make : callable
             Function that returns the result, which must not be changed.
+        equal : sequence, default=()
+            Further objects on which it depends, which may be other ones with the same value.
         """
-        kept, found = self._kept.get(name, ([], None))
-        if name not in self._kept or len(kept) != len(made_of) or not all(map(is_, kept, made_of)):
-            found = make()
-            self._kept[name] = list(made_of), found
+        if name in self._kept:
+            kept, values, found = self._kept[name]
+            if _alike(is_, kept, made_of) and _alike(_is_equal, values, equal):
+                return found
+        found = make()
+        self._kept[name] = list(made_of), list(equal), found
         return found
+
+
+def _alike(test: Callable[[Any, Any], bool], some: Sequence[Any], others: Sequence[Any]) -> bool:
+    return len(some) == len(others) and all(map(test, some, others))
+
+
+def _is_equal(one: Any, other: Any) -> bool:
+    return np.array_equal(one, other) if isinstance(one, np.ndarray) else bool(one == other)

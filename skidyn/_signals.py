@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 SIGN_BLUR = 0.003
 #: A time step longer than this many median steps is a gap.
 GAP_STEPS = 5.0
+#: Standard deviation of a normal distribution over the median of its absolute values.
+MAD = 1.4826
 
 
 def find_segments(trajectory: NDArray[Any], time: Array | None = None) -> list[slice]:
@@ -42,6 +44,48 @@ def find_segments(trajectory: NDArray[Any], time: Array | None = None) -> list[s
         ]
         edges = np.unique(np.concatenate([edges, *gaps])).tolist()
     return [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+
+def scatter(values: Array, axis: int | None = None) -> Any:
+    """Standard deviation around zero of normal values among which there are outliers.
+
+    >>> round(float(scatter(np.array([-1.0, 0.5, 1.0, 90.0]))), 4)
+    1.4826
+    """
+    return MAD * np.median(np.abs(values), axis=axis)
+
+
+def runs_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First rows of the runs of true rows in a mask, and the rows after their last ones.
+
+    >>> runs_of(np.array([True, False, True, True]))
+    (array([0, 2]), array([1, 4]))
+    """
+    edges = np.flatnonzero(np.diff(np.r_[0, mask.astype(int), 0]))
+    return edges[::2], edges[1::2]
+
+
+def rates_of(values: Array, time: Array, segments: Iterable[slice]) -> Array:
+    """Time derivative of channels by central differences; zero in segments of a single row.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_samples, n_channels)
+        Channels.
+    time : ndarray of shape (n_samples,), s
+        Increasing in every segment.
+    segments : iterable of slice
+        Contiguous runs of rows.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_channels), per s
+    """
+    rates = np.zeros(values.shape)
+    for rows in segments:
+        if rows.stop - rows.start > 1:
+            rates[rows] = np.gradient(values[rows], time[rows], axis=0)
+    return rates
 
 
 def _gaps(steps: Array) -> NDArray[np.intp]:

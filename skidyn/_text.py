@@ -81,14 +81,24 @@ def inside(title: str) -> str:
     return title if title.startswith(NAMES) else title[:1].lower() + title[1:]
 
 
-def joints_told(joints: Iterable[int]) -> str:
-    """Text of joints.
+def joints_told(joints: Iterable[int | str]) -> str:
+    """Text of joints, counted from 1.
 
     >>> joints_told([1]), joints_told([1, 2, 4])
     ('joint 1', 'joints 1, 2 and 4')
     """
     numbers = [str(j) for j in joints]
     return f"joint{'s' if len(numbers) > 1 else ''} {listed(numbers)}"
+
+
+def trajectories_told(names: Iterable[int]) -> str:
+    """Text of trajectories.
+
+    >>> trajectories_told([3]), trajectories_told([0, 2])
+    ('trajectory 3', 'trajectories 0 and 2')
+    """
+    numbers = [str(name) for name in names]
+    return f"trajector{'ies' if len(numbers) > 1 else 'y'} {listed(numbers)}"
 
 
 def listed(parts: Sequence[str], word: str = "and") -> str:

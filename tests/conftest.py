@@ -85,6 +85,26 @@ def signals_of():
     return make
 
 
+@pytest.fixture(scope="module")
+def diagnosed_once():
+    """EffectSearchCV diagnoses each log once, since what follows a diagnosis is tested."""
+    import numpy as np
+
+    from skidyn.diagnosis import diagnose
+
+    made = {}
+
+    def once(model, X, y, **options):
+        key = (repr(model), np.asarray(X).tobytes(), y.tobytes(), repr(options))
+        if key not in made:
+            made[key] = diagnose(model, X, y, **options)
+        return made[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("skidyn.diagnosis._effect_search.diagnose", once)
+        yield
+
+
 @pytest.fixture(scope="session")
 def servo_log():
     """Makes the log of a planar arm behind servos, by the coefficients of what it hides."""

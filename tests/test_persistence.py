@@ -364,7 +364,7 @@ def test_no_callable_outside_the_list_is_ever_entered(tmp_path, trusted):
     allowed = {name.rpartition(".")[0] for name in trusted}
     entered: set[tuple[str, str]] = set()
     refused = 0
-    for k in range(600):
+    for k in range(300):
         description = json.loads(members["schema.json"])
         part, key = rng.choice(places(description, []))
         part[key] = crafted_nodes(rng, names, sorted(trusted))
@@ -378,7 +378,7 @@ def test_no_callable_outside_the_list_is_ever_entered(tmp_path, trusted):
                 skidyn.load_model(file)
             except SkidynError:
                 refused += 1
-    assert refused > 500  # the others put something harmless into a place that is never looked at
+    assert refused > 250  # the others put something harmless into a place that is never looked at
     ran = {(module, name) for module, name in entered if module.partition(".")[0] == "skidyn"}
     assert ran
     for module, name in ran - {(m, n) for m, n in ran if m in own}:

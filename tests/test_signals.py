@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from skidyn._signals import rates_of, runs_of, scatter
 from skidyn.datasets import load_planar_arm, load_scara
 from skidyn.diagnosis import diagnose
 from skidyn.effects import Signals
@@ -104,3 +105,22 @@ def test_a_motion_that_is_no_table_is_refused():
     robot = load_planar_arm()
     with pytest.raises(LogError, match="X has 1 dimensions"):
         diagnose(RBDRegressor(robot), np.zeros(10), np.zeros((10, 2)))
+
+
+def test_rates_within_segments():
+    time = np.array([0.0, 1.0, 3.0, 4.0, 9.0])
+    values = np.array([[0.0], [1.0], [3.0], [9.0], [7.0]])
+    rates = rates_of(values, time, [slice(0, 3), slice(3, 4), slice(4, 5)])
+    assert rates.ravel().tolist() == [1.0, 1.0, 1.0, 0.0, 0.0]
+
+
+def test_runs_of_true_rows():
+    begins, ends = runs_of(np.array([False, True, True, False, True]))
+    assert (begins.tolist(), ends.tolist()) == ([1, 4], [3, 5])
+    assert runs_of(np.zeros(3, bool))[0].tolist() == []
+
+
+def test_scatter_of_normal_values_beside_outliers():
+    values = np.random.default_rng(0).normal(scale=2.0, size=(4000, 2))
+    values[::20] = 100.0
+    np.testing.assert_allclose(scatter(values, axis=0), 2.0, rtol=0.12)

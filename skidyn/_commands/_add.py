@@ -45,7 +45,7 @@ def add_parser(commands: Any) -> None:
         commands,
         "add",
         run,
-        "add an effect to a diagnosed model and print the error before, after",
+        "add an effect to a diagnosed model and print the error before and after",
         DESCRIPTION,
     )
     with_report(parser)

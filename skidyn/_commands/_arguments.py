@@ -257,9 +257,9 @@ def with_controller(parser: Any, text: str) -> None:
     parser.add_argument(
         "--controller",
         metavar="fit|JSON",
-        help=f"{text}, through this controller: fit finds it from the log (fit-shared: one gain "
-        'for all joints), \'{"stiffness": 40, "damping": 2}\' gives it (N m/rad, N m s/rad; null '
-        "for no limit)",
+        help=f"{text}, through this controller: fit estimates it from the log (fit-shared: one "
+        'gain for all joints), \'{"stiffness": 40, "damping": 2}\' states it (N m/rad, N m s/rad; '
+        "null for no limit)",
     )
 
 

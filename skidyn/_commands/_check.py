@@ -24,9 +24,9 @@ and number of reversals of each joint.
   skidyn check run1.csv run2.csv
   skidyn check run1.csv --urdf robot.urdf
 
-at rest: share of rows in which the joint does not move; at limit: share of rows at the extreme
-torque; dq/q': ratio of recorded velocity to differentiated position, 1 in a consistent log; delay:
-delay of the torque.
+In this table, "at rest" is the share of rows in which the joint does not move, "at limit" the share
+of rows at the extreme torque, "dq/q'" the ratio of recorded velocity to differentiated position,
+which is 1 in a consistent log, and "delay" that of the torque.
 """
 
 
@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> None:
         print(quality)
         remedies = [c.remedy.option for c in quality.checks if c.remedy and c.certainty != "noted"]
         if remedies:
-            print("\nto fix all of it, and check again:")
+            print("\nto fix all of these problems and check again:")
             print(f"  skidyn {shlex.join(_with_remedies(options.words, remedies))}")
 
 

@@ -43,9 +43,9 @@ file beside it.
   skidyn compare new*.csv --urdf robot.urdf --against worn*.csv --html wear.html
   skidyn compare new.json worn.json --html wear.html
 
-A gate for tests: the model is fitted to a healthy recording, and the error of a joint on the new
-recording must not exceed the given multiple of its usual error. If a joint fails, its name is
-printed and the exit code is 1.
+With --fail-above, the command is a test of the robot: the model is fitted to a healthy recording,
+and the error of a joint on the new recording must not exceed the given multiple of its usual error.
+If a joint fails, its name is printed and the exit code is 1.
 
   skidyn compare new*.csv --urdf robot.urdf --against healthy*.csv --fail-above 1.5
 """

@@ -24,7 +24,7 @@ that were put aside.
 
 
 def add_parser(commands: Any) -> None:
-    parser = command(commands, "demo", run, "the whole loop on a simulated log", DESCRIPTION)
+    parser = command(commands, "demo", run, "run the whole loop on a simulated log", DESCRIPTION)
     parser.add_argument("--html", type=Page, default="skidyn-demo.html", help="page to write")
 
 

@@ -30,7 +30,7 @@ def add_parser(commands: Any) -> None:
     parser = command(commands, "excite", run, "design a motion for identification", DESCRIPTION)
     parser.add_argument("--urdf", type=Input, required=True, help="description of the robot")
     parser.add_argument("--out", type=Motion, required=True, metavar="CSV", help="motion to write")
-    parser.add_argument("--duration", type=float, default=20.0, help="s (default: %(default)s)")
+    parser.add_argument("--duration", type=float, default=20.0, help="in s (default: %(default)s)")
     parser.add_argument(
         "--sampling",
         type=float,

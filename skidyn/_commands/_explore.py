@@ -13,8 +13,9 @@ from skidyn._commands._input import covered_joints, read_checked, reading
 from skidyn._commands._output import print_suspicions, working
 
 DESCRIPTION = """\
-Run the loop by hand on a local page: view the measurement against the model, click where the model
-fails, see which effects would reduce the error there, add one and view the new error; undo; save.
+Search for effects by hand on a local page: view the measurement against the model, click where the
+model fails, see which effects would reduce the error there, add one and view the new error; undo
+the last step, or save the result.
 
   skidyn explore run*.csv --urdf robot.urdf --folder results
 
@@ -25,10 +26,14 @@ Ctrl-C stops the server.
 
 
 def add_parser(commands: Any) -> None:
-    parser = command(commands, "explore", run, "the loop by hand, in a browser", DESCRIPTION)
+    parser = command(
+        commands, "explore", run, "search for effects by hand in a browser", DESCRIPTION
+    )
     with_log(parser)
     parser.add_argument("--folder", default=".", help="where results are saved (default: here)")
-    parser.add_argument("--port", type=int, default=0, help="port (default: a free one)")
+    parser.add_argument(
+        "--port", type=int, default=0, help="port of the page (default: a free one)"
+    )
     with_controller(
         parser, "compute the torque of a log without torque from the commands of its servos"
     )

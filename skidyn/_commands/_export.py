@@ -120,7 +120,7 @@ def run(options: argparse.Namespace) -> None:
         for name, effects in left.items():
             print(f"written: {name}")
             if effects:
-                print(f"  not in it, but in {name}.skidyn.json: {', '.join(effects)}")
+                print(f"  left out, and listed in {name}.skidyn.json: {', '.join(effects)}")
     if failed:
         raise SkidynError("not written: " + "; ".join(failed))
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from skidyn._commands._input import read_model_and_log, read_robot
 from skidyn._commands._output import print_json
 from skidyn._exceptions import SkidynError
+from skidyn._text import listed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,9 +103,9 @@ def _print(joints: list[dict[str, Any]], limit: float) -> None:
         print(f"  {j['name']:24s} {numbers}{mark}")
     names = [j["name"] for j in joints if j["failed"]]
     if names:
-        print(f"failed: {', '.join(names)} above {limit:g} times the usual error")
+        print(f"failed: the error of {listed(names)} is above {limit:g} times the usual one")
     else:
-        print(f"passed: no joint is above {limit:g} times the usual error")
+        print(f"passed: the error of no joint is above {limit:g} times the usual one")
 
 
 def _write_junit(path: str, joints: list[dict[str, Any]], limit: float) -> None:

@@ -85,8 +85,8 @@ def run(options: argparse.Namespace) -> None:
         print(f"{row['value']:12.5g} ± {row['std']:9.2g}   {row['name']}")
     if options.essential:
         print(
-            f"{len(essential['eliminated'])} others left out; the error grows by "
-            f"{100 * (essential['error_ratio'] - 1):.2g} %"
+            f"{len(essential['eliminated'])} other parameters are left out, which increases the "
+            f"error by {100 * (essential['error_ratio'] - 1):.2g} %"
         )
     print(f"condition number of the excitation: {model.condition_number_:.3g}")
     for combination in content["open_combinations"]:

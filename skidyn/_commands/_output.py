@@ -231,7 +231,10 @@ def print_json(content: Any) -> None:
 
 
 def print_comparison(comparison: Comparison) -> None:
-    print("error by joint and trajectory, all samples: rmse (N m, N for sliders), share of torque")
+    print(
+        "error by joint and trajectory, on all samples, and as a share of the torque "
+        "(root mean squares in N m, N for sliders)"
+    )
     for row in comparison.table():
         print(
             f"  {row['name']:24s} trajectory {row['trajectory']:4d} "
@@ -242,7 +245,7 @@ def print_comparison(comparison: Comparison) -> None:
 def print_regimes(diagnosis: Diagnosis) -> None:
     import numpy as np
 
-    print("by joint and regime (N m, N for sliders)")
+    print("error by joint and regime (N m, N for sliders)")
     width = max(len(name) for name in diagnosis.joint_names)
     widths = [max(8, len(name) + 1) for name in diagnosis.regimes]  # seven fit into 80 columns
     heads = zip(diagnosis.regimes, widths, strict=True)

@@ -12,8 +12,8 @@ from skidyn._commands._input import read_model_and_log, recorded_options
 from skidyn._commands._output import print_json, run_diagnosis, working
 
 DESCRIPTION = """\
-If a report says "this data cannot separate it from B", design a motion that separates the two
-effects.
+If a report states that "this data cannot separate it from B", design a motion that separates the
+two effects.
 
   skidyn separate --from report.json --out motion.csv
 
@@ -30,7 +30,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--out", type=Motion, required=True, metavar="CSV", help="motion to write")
     parser.add_argument("--effect", dest="finding", help="kind of the finding (default: the first)")
     parser.add_argument("--rival", help="the other kind (default: the closest rival)")
-    parser.add_argument("--duration", type=float, default=20.0, help="s (default: %(default)s)")
+    parser.add_argument("--duration", type=float, default=20.0, help="in s (default: %(default)s)")
 
 
 def run(options: argparse.Namespace) -> None:

@@ -18,6 +18,7 @@ from skidyn._commands._input import (
 )
 from skidyn._commands._output import print_json, working, write_table
 from skidyn._exceptions import SkidynError
+from skidyn._text import joints_told
 
 DESCRIPTION = """\
 With --model and --log, simulate a fitted model along a log and print how far its motion deviates
@@ -44,10 +45,15 @@ def add_parser(commands: Any) -> None:
         DESCRIPTION,
     )
     parser.add_argument("--robot", default="panda", help="embedded robot (default: %(default)s)")
-    parser.add_argument("--effect", default="dahl", help="kind, or none (default: %(default)s)")
+    parser.add_argument(
+        "--effect", default="dahl", help="kind of the effect, or none (default: %(default)s)"
+    )
     with_joints(parser, "joints with the effect (default: a suitable choice)")
     parser.add_argument(
-        "--noise", default="low", choices=("low", "high"), help="of torques (default: %(default)s)"
+        "--noise",
+        default="low",
+        choices=("low", "high"),
+        help="noise of the torques (default: %(default)s)",
     )
     parser.add_argument(
         "--seed", type=int, default=0, help="seed of all random numbers (default: 0)"
@@ -79,7 +85,10 @@ def add_parser(commands: Any) -> None:
         "trajectories (default: %(default)s)",
     )
     along.add_argument(
-        "--engine", default="own", choices=("own", "mujoco"), help="default: %(default)s"
+        "--engine",
+        default="own",
+        choices=("own", "mujoco"),
+        help="simulator of the motion (default: %(default)s)",
     )
     with_controller(
         along, "drive the model by the commanded positions of the log instead of its torque"
@@ -161,8 +170,7 @@ def _told(effect: str | None, joints: list[int], parameters: Mapping[str, Any]) 
     """Description of the hidden effect."""
     if effect is None:
         return "nothing"
-    where = f" on joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))}"
-    lines = [f"{effect}{where if joints else ''}"]
+    lines = [f"{effect} on {joints_told(joints)}" if joints else effect]
     for name, value in parameters.items():
         numbers = value if isinstance(value, (list, tuple)) else [value]
         shown = (f"{x:.4g}" if isinstance(x, float) else str(x) for x in numbers)

@@ -174,7 +174,8 @@ def catalogue_candidates(
                 grid = [effect.bounded(few, joints, s, size_share) for s in grid]
             terms += [Term.at(kind, joints, shape) for shape in grid]
     # Data shared by kinds with the same needs is cached for one joint at a time.
-    ordered = sorted(terms, key=lambda term: (term.effect.needs, term.places))
+    own = [*problem.terms, *terms]  # those of the model may depend on the load of the fit, too
+    ordered = sorted(own, key=lambda term: (term.effect.needs, term.places))
     problem.prepare(ordered, text="Preparing effects")
     return [Candidate(t.kind, t, problem.term_rows(t), n_shapes=_refined(t)) for t in terms]
 

@@ -574,7 +574,6 @@ def _episodic(
         for j in joints
     ]
     numbers = sorted({e.trajectory for e in episodes})
-    where = f"joint {joints[0]}" if len(joints) == 1 else f"joints {', '.join(map(str, joints))}"
     times = ", ".join(
         f"{e.start:.2f} to {e.end:.2f} s of trajectory {e.trajectory}" for e in episodes[:4]
     )
@@ -584,7 +583,7 @@ def _episodic(
         f" A force at link {', '.join(sorted(links))} explains all these joints." if links else ""
     )
     sentence = (
-        f"An intermittent torque acts on {where}: {times}{more}. It accounts for "
+        f"An intermittent torque acts on {joints_told(joints)}: {times}{more}. It accounts for "
         f"{np.mean(shares):.0%} of the remaining squared error there, and no logged signal "
         f"predicts it.{push}"
     )

@@ -184,8 +184,7 @@ def _inside(problem: Problem, joint: int, parts: Sequence[Array]) -> Array:
 
 def _since_start(problem: Problem) -> list[Array]:
     """Time of every row since the middle of its recording, as a share of the length, by joint."""
-    edges = np.cumsum([len(t) for t in problem.rows.time])[:-1]
-    return np.split(problem.rows.spans[2] - 0.5, edges)
+    return problem.rows.split(problem.rows.spans[2] - 0.5)
 
 
 def _standard(values: Array) -> Array:

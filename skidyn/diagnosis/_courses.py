@@ -106,13 +106,12 @@ class _Course:
 
     def rows(self, rows: dict[int, Array], recordings: Sequence[int]) -> dict[int, Array]:
         """Columns times the line, and zero in other recordings."""
-        counts = self.problem.rows.counts
         place = self.problem.rows.spans[0]
         start, length = self.ends[place, 0], np.ptp(self.ends, axis=1)[place]
         share = (np.concatenate(self.problem.rows.time) - start) / np.maximum(length, 1e-300)
         line = self.first[place] + (self.last - self.first)[place] * share
         line = np.where(np.isin(self.problem.rows.recordings[place], recordings), line, 0.0)
-        own = np.split(line, np.cumsum(counts)[:-1])
+        own = self.problem.rows.split(line)
         return {j: block * own[j][:, None] for j, block in rows.items()}
 
     def inside(self, rows: dict[int, Array], recordings: Sequence[int]) -> dict[int, Array]:

@@ -29,10 +29,8 @@ from skidyn.diagnosis._limits import Gates, Limit, find_limits, without_withdraw
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._reversals import look_at_reversals
 from skidyn.diagnosis._rule import (
-    CORRELATION_TIMES,
-    SHORTEST_BLOCK,
     Settings,
-    correlation_time,
+    block_length,
     time_blocks,
     variance_inflation,
 )
@@ -374,14 +372,12 @@ def _limits(
     blocks = [problem.term_rows(t) for t in (*problem.terms, *found)]
     counts = problem.rows.counts
     fit = result.fit
-    everywhere = range(problem.n_joints)
-    correlated = correlation_time(problem, fit.residual, everywhere)
-    _, n_blocks = time_blocks(problem, max(SHORTEST_BLOCK, CORRELATION_TIMES * correlated))
+    inflation = variance_inflation(problem, fit.residual, range(problem.n_joints))
+    _, n_blocks = time_blocks(problem, block_length(problem, inflation))
     gain = sum((h.gain for h in result.findings), np.zeros(problem.n_joints))
     share = np.expm1(np.maximum(np.asarray(gain, dtype=float), 0.0) / np.maximum(counts, 1))
     earlier = np.asarray(counts * share, dtype=np.float64)
     gates = Gates(settings, result.n_tests, n_blocks - 1, counts, _whiteness(problem, fit), earlier)
-    inflation = variance_inflation(problem, fit.residual, everywhere)
     return find_limits(problem, result.candidates, blocks, fit.noise, inflation, gates)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skidyn._signals import Array
-from skidyn._text import digits, listed, times
+from skidyn._text import digits, listed, times, trajectories_told
 from skidyn.diagnosis._comparison import Comparison, regimes
 
 #: A joint fails where its error on judged rows exceeds the noise by this factor: logs without an
@@ -287,7 +287,7 @@ def _trajectory_place(
     if not _stands_out(held, spent):
         return None
     which = tuple(sorted(int(name) for name in names[order[: k + 1]]))
-    where = f"in trajector{'y' if len(which) == 1 else 'ies'} {', '.join(map(str, which))}"
+    where = f"in {trajectories_told(which)}"
     return Place("trajectory", where, min(held, 1.0), spent, trajectories=which)
 
 

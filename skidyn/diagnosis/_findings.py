@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn._text import give_or_take, inside, listed
+from skidyn._text import give_or_take, inside, joints_told, listed, trajectories_told
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._episodes import Episode
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis
@@ -22,6 +22,8 @@ from skidyn.evidence import Problem
 RIVAL_SHARE = 0.8
 #: Points of a curve.
 BINS = 40
+#: Number of times at which an effect acts that are listed.
+LISTED = 4
 
 
 @dataclass(frozen=True)
@@ -187,7 +189,7 @@ def make_finding(
     title = effect.title
     if unknown:
         own = effect.words(term.shape) if isinstance(effect, NamelessEffect) else ""
-        title = own or f"Unknown torque that depends on {' and '.join(variables)}"
+        title = own or f"Unknown torque that depends on {listed(variables)}"
     relatives = [k for k in rivals if k != UNKNOWN and get_effect(k).family == effect.family]
     if effect.family and relatives:
         title = f"{effect.family.capitalize()}, best described by {title}"
@@ -199,7 +201,7 @@ def make_finding(
     else:
         code = f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'
     sentence = f"{told_briefly(title, joints, term.trajectories, parameters)}. "
-    sentence += _spans_told(term)
+    sentence += f"It {spans_told(term.spans)}. " if term.spans else ""
     sentence += f"It {course_told(term)}. " if term.course else ""
     sentence += _fall_told(error_drop)
     if rivals:
@@ -239,7 +241,7 @@ def make_finding(
 
 def pairs_of(pairs: Sequence[Sequence[int]]) -> str:
     """Text of pairs of joints for a sentence."""
-    return listed([f"joints {' and '.join(map(str, joints))}" for joints in pairs], "or")
+    return listed(list(map(joints_told, pairs)), "or")
 
 
 def _joints(problem: Problem, hypothesis: Hypothesis, candidate: Candidate) -> tuple[int, ...]:
@@ -280,10 +282,9 @@ def told_briefly(
     parameters: dict[str, dict[str, Any]],
 ) -> str:
     """Effect, joints, and its first parameter or vector, without a full stop."""
-    where = f"joint {joints[0]}" if len(joints) == 1 else f"joints {', '.join(map(str, joints))}"
+    where = joints_told(joints)
     if trajectories is not None:
-        many = "y" if len(trajectories) == 1 else "ies"
-        where += f" in trajector{many} {', '.join(map(str, trajectories))}"
+        where += f" in {trajectories_told(trajectories)}"
     # the first that is not zero, with the other components of its vector
     rows = sorted(parameters.items(), key=lambda item: _may_be_zero(item[1]))
     stem = _stem(rows[0][0]) if rows else ""
@@ -298,16 +299,22 @@ def _stem(name: str) -> str:
     return stem if axis in ("x", "y", "z") else name
 
 
-def _spans_told(term: Term) -> str:
-    """Times at which an effect begins or ends within recordings."""
-    if not term.spans:
-        return ""
+def spans_told(spans: Sequence[tuple[int, float, float]]) -> str:
+    """When an effect acts that begins or ends within recordings, as a predicate.
+
+    Parameters
+    ----------
+    spans : sequence of (int, float, float)
+        Recording, and time of begin and end in it, s; at least one.
+    """
     times = [
         f"from {start:.1f} to {end:.1f} s of trajectory {name}"
-        for name, start, end in term.spans[:4]
+        for name, start, end in spans[:LISTED]
     ]
-    more = len(term.spans) - 4
-    return f"It acts {listed([*times, f'in part of {more} more'] if more > 0 else times)}. "
+    more = len(spans) - LISTED
+    if more > 0:
+        times.append(f"at {more} other time{'s' if more > 1 else ''}")
+    return f"acts {listed(times)}"
 
 
 def course_told(term: Term) -> str:

@@ -31,8 +31,6 @@ CONFIDENCE = 0.95
 #: it, relative to the torque; divisor of a step with a larger change, as of a fine ripple.
 STEP, LARGEST_CHANGE, SMALLER = 0.02, 0.3, 8.0
 
-Interval = tuple[float, float, float]
-
 
 def parameter_intervals(
     problem: Problem, terms: Sequence[Term], sigma: Array, shapes: bool = True

@@ -5,17 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-import numpy as np
-from numpy.typing import NDArray
-
 from skidyn._cores import each
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._clock import LOWEST, clock_line
 from skidyn.diagnosis._followed_signals import Followed, followed_signals
-from skidyn.diagnosis._hypothesis import (
-    UNKNOWN,
-)
+from skidyn.diagnosis._hypothesis import UNKNOWN
 from skidyn.diagnosis._spectrum import SLOWEST
 from skidyn.effects import (
     FunctionOfSignals,
@@ -26,8 +21,6 @@ from skidyn.effects import (
     nameless_kinds,
 )
 from skidyn.evidence import Problem
-
-Mask = NDArray[np.bool_]
 
 
 def nameless_candidates(

@@ -32,7 +32,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache
@@ -339,7 +339,7 @@ class Tester:
         self.problem, self.sigma = problem, sigma
         felt, width = felt_columns(problem, blocks, sigma)
         y = [t / s for t, s in zip(target, sigma, strict=True)]
-        self._duration = _duration(problem)
+        self._duration = float(sum(problem.rows.spans[1]))
         self._fit(felt, gram_of(felt, width), products_with(felt, dict(enumerate(y)), width), y)
 
     def _fit(self, felt: list[Felt], gram: Array, right: Array, target: list[Array]) -> None:
@@ -446,8 +446,7 @@ class Tester:
         aside = np.concatenate([z[:, zeros] for z in new])
         both = np.column_stack([np.concatenate(self.residual), *np.concatenate(new)[:, ~zeros].T])
         both -= aside @ np.linalg.lstsq(aside, both, rcond=NEW_SHARE)[0]
-        ends = np.cumsum([len(e) for e in self.residual])[:-1]
-        parts = np.split(both, ends)
+        parts = self.problem.rows.split(both)
         columns, left = [part[:, 1:] for part in parts], [part[:, 0] for part in parts]
         alone = self._test(own, columns, left, significant)
         return replace(test, chance=max(test.chance, alone.chance))
@@ -615,10 +614,9 @@ class Tester:
         inflation: Callable[[int], float],
     ) -> float:
         """P-value of the coefficients for independent scores of blocks."""
-        correlated = self.problem.rows.hop * max(1.0, *map(inflation, rows))
-        length, k = correlated * CORRELATION_TIMES, len(score)
-        longest = self._duration / (2 * k + ENOUGH_BLOCKS)
-        block, count = time_blocks(self.problem, min(max(SHORTEST_BLOCK, length), longest))
+        longest = self._duration / (2 * len(score) + ENOUGH_BLOCKS)
+        length = min(block_length(self.problem, map(inflation, rows)), longest)
+        block, count = time_blocks(self.problem, length)
         index = np.concatenate(block)
         order = np.argsort(index, kind="stable")
         edges = np.searchsorted(index[order], np.arange(count + 1)).tolist()
@@ -719,21 +717,21 @@ def time_blocks(problem: Problem, length: float) -> tuple[list[NDArray[np.int64]
     number = np.maximum(1, np.round(span / length)).astype(np.int64)
     first = np.cumsum(number) - number
     block = first[place] + np.minimum((share * number[place]).astype(np.int64), number[place] - 1)
-    edges = np.cumsum([len(t) for t in rows.time])[:-1]
-    return np.split(block, edges), int(number.sum())
+    return rows.split(block), int(number.sum())
 
 
-def _duration(problem: Problem) -> float:
-    """Total time of the rows of the trajectories, in s."""
-    trajectory, time = np.concatenate(problem.rows.trajectory), np.concatenate(problem.rows.time)
-    return sum(float(np.ptp(time[trajectory == name])) for name in np.unique(trajectory))
+def block_length(problem: Problem, inflation: Iterable[float]) -> float:
+    """Length of blocks of time that are nearly independent, in s.
 
-
-def correlation_time(problem: Problem, residual: Sequence[Array], joints: Sequence[int]) -> float:
-    """Longest correlation time of the residual among some joints, in s."""
-    hop = problem.rows.hop
-    inflation = variance_inflation(problem, [residual[j] for j in joints], joints)
-    return hop * float(np.max(inflation, initial=1.0))
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    inflation : iterable of float
+        Of the variance, of :func:`variance_inflation`, for some joints.
+    """
+    correlated = problem.rows.hop * max([1.0, *inflation])
+    return float(max(SHORTEST_BLOCK, CORRELATION_TIMES * correlated))
 
 
 def variance_inflation(

@@ -21,6 +21,7 @@ from scipy.optimize import OptimizeResult, differential_evolution
 from skidyn._exceptions import EffectError
 from skidyn._progress import tell
 from skidyn._signals import Array, Signals, read_signals
+from skidyn._text import listed
 from skidyn.diagnosis._hypothesis import Hypothesis
 from skidyn.diagnosis._rule import Settings
 from skidyn.diagnosis._search import search
@@ -99,7 +100,7 @@ class SeparatingMotion:
         )
         if all(self.confirmed.values()):
             return text + " In simulated recordings of this motion both effects were recognised."
-        wrong = " and ".join(k for k, right in self.confirmed.items() if not right)
+        wrong = listed([k for k, right in self.confirmed.items() if not right])
         return (
             f"{text} In a simulated recording with {wrong} as the truth the effect was still not "
             "recognised."

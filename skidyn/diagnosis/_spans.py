@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +87,6 @@ class _Times:
     def __init__(self, problem: Problem) -> None:
         self.problem, self.names = problem, problem.rows.recordings
         rows = problem.rows
-        self.edges = np.cumsum([len(t) for t in rows.time])[:-1]
         self.time, self.of = np.concatenate(rows.time), np.concatenate(rows.trajectory)
         order = np.lexsort((self.time, self.of))
         borders = np.flatnonzero(np.diff(self.of[order])) + 1
@@ -101,13 +99,9 @@ class _Times:
         """Whether rows belong to some recordings, all joints one after another."""
         return np.isin(self.of, recordings)
 
-    def split(self, values: NDArray[Any]) -> list[NDArray[Any]]:
-        """Values of all rows by joint."""
-        return np.split(values, self.edges)
-
     def cut(self, rows: dict[int, Array], inside: NDArray[np.bool_]) -> dict[int, Array]:
         """Columns that are zero outside some times."""
-        own = self.split(inside)
+        own = self.problem.rows.split(inside)
         return {j: block * own[j][:, None] for j, block in rows.items()}
 
     def best(self, excess: Array) -> NDArray[np.bool_]:
@@ -171,7 +165,7 @@ def _alternated(
         best, drop = inside, removed
         left = tester.beside([rows]).residual
         excess = []
-        for j, own in enumerate(times.split(inside)):
+        for j, own in enumerate(times.problem.rows.split(inside)):
             if j not in whole.rows:
                 excess.append(np.zeros(len(own)))
                 continue

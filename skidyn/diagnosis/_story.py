@@ -8,9 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skidyn._text import digits, fall, give_or_take, inside, joints_told, listed, raised, times
+from skidyn._text import (
+    digits,
+    fall,
+    give_or_take,
+    inside,
+    joints_told,
+    listed,
+    raised,
+    times,
+    trajectories_told,
+)
 from skidyn.diagnosis._failures import FAILS
-from skidyn.diagnosis._findings import course_told, pairs_of, rival_title
+from skidyn.diagnosis._findings import course_told, pairs_of, rival_title, spans_told
 from skidyn.diagnosis._rule import GUESS
 from skidyn.diagnosis._servo_motion import servo_motion_told
 from skidyn.effects import get_effect
@@ -232,8 +242,8 @@ def _line(diagnosis: Diagnosis, k: int, rows: Sequence[dict[str, Any]]) -> dict[
         "step": at,
         "fell": 0.0 if best is None else fell(best),
         "what": finding.title,
-        "where": where(finding.joints, len(rows)) + trajectories_told(finding),
-        "only": trajectories_told(finding),
+        "where": where(finding.joints, len(rows)) + _recordings(finding),
+        "only": _recordings(finding),
         "when": when_told(finding),
         "size": ", ".join(shown[: _told(finding)]),
         "clear": dict(zip(shown, weights, strict=True)),
@@ -319,7 +329,7 @@ def sure(finding: Finding) -> str:
     elif finding.kind == "unknown":
         text = "no effect of the catalogue explains it"
     elif is_setting(finding):
-        text = "the torque that the motion requires shows it"
+        text = "the torque that the motion requires is the evidence for it"
     elif not text:
         text = "no other effect explains it as well"
     return text
@@ -371,21 +381,15 @@ def where(joints: Sequence[int], n_joints: int) -> str:
     return "all joints" if len(joints) == n_joints > 2 else joints_told(joints)
 
 
-def trajectories_told(finding: Finding) -> str:
+def _recordings(finding: Finding) -> str:
     """Text of the trajectories of a finding that acts in some of them only."""
-    which = finding.trajectories
-    if not which:
-        return ""
-    return f" in trajector{'y' if len(which) == 1 else 'ies'} {', '.join(map(str, which))}"
+    return f" in {trajectories_told(finding.trajectories)}" if finding.trajectories else ""
 
 
 def when_told(finding: Finding) -> str:
     """When a finding acts or how it changes, as a predicate; empty if it always acts alike."""
-    times = [
-        f"from {e.start:.1f} to {e.end:.1f} s of trajectory {e.trajectory}" for e in finding.when
-    ]
-    if times:
-        return "acts " + listed(times[:3] + (["at other times"] if len(times) > 3 else []))
+    if finding.when:
+        return spans_told([(e.trajectory, e.start, e.end) for e in finding.when])
     return next(filter(None, map(course_told, finding.terms)), "")
 
 

@@ -154,13 +154,12 @@ def _slope(signals: Signals, joint: int, by: str) -> Array:
 def _differentiate_torque(signals: Signals, joint: int, by: str) -> Array:
     robot = signals.robot
     assert robot is not None
-    inverse_dynamics = partial(robot.inverse_dynamics, parameters=signals.inertial_parameters)
-    q, dq, ddq = signals.q, signals.dq, signals.ddq
+    own, q, dq, ddq = signals.inertial_parameters, signals.q, signals.dq, signals.ddq
     direction = np.zeros(signals.n_joints)
     direction[joint] = 1.0
     if by == "acceleration":
-        ones = np.broadcast_to(direction, q.shape)
-        return inverse_dynamics(q, np.zeros_like(dq), ones, gravity=(0.0, 0.0, 0.0))
+        return robot.inertial_torque(q, np.broadcast_to(direction, q.shape), parameters=own)
+    inverse_dynamics = partial(robot.inverse_dynamics, parameters=own)
     here: Array = signals.once("torque", lambda: inverse_dynamics(q, dq, ddq), of_fit=True)
     step = _STEP * signals.unit[joint]
     moved = inverse_dynamics(

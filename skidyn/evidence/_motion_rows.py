@@ -41,7 +41,8 @@ def read_motion(signals: Signals, smooth: bool, torque: Array) -> Signals:
     """Motion as used by the rows, smoothed or as logged, without broken samples."""
     if signals.time is None:
         return signals
-    motion = without_broken(smooth_motion(signals), signals, torque)
+    smoothed = signals.once("smooth motion", lambda: smooth_motion(signals))  # by checks, too
+    motion = without_broken(smoothed, signals, torque)
     return motion if smooth else motion.with_(q=signals.q, dq=signals.dq, ddq=signals.ddq)
 
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, groupby
-from operator import is_
 from typing import Any
 
 import numpy as np
@@ -74,8 +73,6 @@ class Problem:
     rigid_rows: list[Array] = field(default_factory=list)
     logged: Signals | None = None
     _cache: dict[Term, dict[int, Array]] = field(default_factory=dict, repr=False)
-    #: Last results that are asked for again; shared by copies, since they state what they are of.
-    _last: dict[str, tuple[list[Any], Any]] = field(default_factory=dict, repr=False)
     last: LastResults = field(default_factory=LastResults, repr=False)
     _thinned: dict[int, list[csr_matrix]] = field(default_factory=dict, repr=False)
 
@@ -253,14 +250,12 @@ class Problem:
     ) -> list[FittedAlone]:
         """Fit of every joint by itself; a search asks for the same one several times."""
         made_of = [*self.rigid_rows, *(b[j] for b in blocks for j in b)]
-        kept, found = self._last.get("alone", ([], ()))
-        if len(kept) == len(made_of) and all(map(is_, kept, made_of)):
-            before, fits = found
-            if all(map(np.array_equal, before, target)):
-                return list(fits)
-        pairs = zip(self.design(blocks) if design is None else design, target, strict=True)
-        fits = [FittedAlone.of(a, y) for a, y in pairs]
-        self._last["alone"] = made_of, (target, fits)
+
+        def make() -> list[FittedAlone]:
+            pairs = zip(self.design(blocks) if design is None else design, target, strict=True)
+            return [FittedAlone.of(a, y) for a, y in pairs]
+
+        fits: list[FittedAlone] = self.last.get("alone", made_of, make, target)
         return fits
 
     def sample_folds(self, joint: int, rows: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
@@ -334,16 +329,17 @@ class Problem:
         made_of = [fit.coefficients, self.rigid_index, s.q, s.dq, s.ddq, s.time, s.trajectory]
         if any(t.effect.follows_fit or "robot" in t.effect.needs for t in fit.terms):
             made_of += [s.load, s.model_torque, s.inertial_parameters]
-        kept, found = self._last.get("explained", ([], ()))
-        if len(kept) == len(made_of) and all(map(is_, kept, made_of)) and found[0] == fit.terms:
-            return np.asarray(found[1])
-        torque = self.term_torque(fit)
-        if self.rigid_body:
-            assert self.robot is not None
-            change = self.correction(fit.coefficients)
-            torque += self.robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=change)
-        torque.flags.writeable = False  # it is returned again
-        self._last["explained"] = made_of, (fit.terms, torque)
+
+        def make() -> Array:
+            torque = self.term_torque(fit)
+            if self.rigid_body:
+                assert self.robot is not None
+                change = self.correction(fit.coefficients)
+                torque += self.robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=change)
+            torque.flags.writeable = False  # it is returned again
+            return torque
+
+        torque: Array = self.last.get("explained", made_of, make, [fit.terms])
         return torque
 
     def set_fit(self, fit: Fit) -> None:

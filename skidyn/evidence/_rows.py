@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,6 +124,10 @@ class Rows:
     @cached_property
     def _earlier(self) -> dict[tuple[int, int], NDArray[np.intp]]:
         return {}
+
+    def split(self, values: NDArray[Any]) -> list[NDArray[Any]]:
+        """Values of the rows of all joints, one joint after another, by joint."""
+        return np.split(values, np.cumsum(self.counts)[:-1])
 
     def average(self, values: Array, joint: int) -> Array:
         """Rows of a joint from values at every sample, shape (n_samples,) or (n_samples, k)."""

@@ -105,7 +105,7 @@ def function_text(static: StaticModel, name: str) -> str:
     return _TEMPLATE.format(
         robot=printable(robot.name),
         terms=printable(static.title),
-        left=f"\n * Not in it: {printable(left)}.\n *" if left else "",
+        left=f"\n * Left out: {printable(left)}.\n *" if left else "",
         joints=printable(", ".join(robot.joint_names)),
         name=name,
         n=robot.n_joints,

@@ -112,7 +112,7 @@ def _text(static: StaticModel, name: str) -> str:
     return _TEMPLATE.format(
         robot=printable(robot.name),
         terms=printable(static.title),
-        left=f" Not in it: {printable(left)}." if left else "",
+        left=f" Left out: {printable(left)}." if left else "",
         functions=f"from numpy import {', '.join(used)}\n" if used else "",
         joints=tuple(map(str, robot.joint_names)),
         name=name,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from skidyn._columns import column_names, command_columns, names_of_table, resolve_columns
 from skidyn._exceptions import SkidynError
-from skidyn._signals import Array, Signals, signals_from
+from skidyn._signals import Array, Signals, rates_of, signals_from
 from skidyn.evidence import smooth_motion
 from skidyn.forward._controller import Controller
 from skidyn.forward._model import Conditions, ForwardModel
@@ -73,10 +73,7 @@ def read_task(
 def commanded(signals: Signals, windows: Windows, controller: Controller, reference: Array) -> Task:
     """Pieces of a log in which a controller follows its reference."""
     assert signals.time is not None
-    rate = np.zeros_like(reference)
-    for rows in signals.segments:
-        if rows.stop - rows.start > 1:
-            rate[rows] = np.gradient(reference[rows], signals.time[rows], axis=0)
+    rate = rates_of(reference, signals.time, signals.segments)
     checked = controller.checked(reference.shape[1])
     return Task(signals, windows, None, checked, reference, rate)
 

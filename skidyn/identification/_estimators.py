@@ -13,13 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from skidyn._signals import Array
+from skidyn._signals import Array, scatter
 from skidyn.identification._instrumental import instrumental
 from skidyn.identification._priors import entropic, ridge
 from skidyn.identification._regression import PASSES, Regression, Solution
 
-#: Median absolute deviation to standard deviation of a normal distribution.
-MAD = 1.4826
 #: Huber's constant (95 % efficiency on normal errors), degrees of freedom of Student's t, and
 #: rounds of reweighting for either.
 HUBER, DEGREES, REWEIGHTINGS = 1.345, 4.0, 15
@@ -78,7 +76,7 @@ def robust(regression: Regression, prior_std: float | None = None) -> Solution:
 
 
 def _scale(residual: Array) -> float:
-    return MAD * float(np.median(np.abs(residual))) + 1e-100 if len(residual) else 1.0
+    return float(scatter(residual)) + 1e-100 if len(residual) else 1.0
 
 
 def _huber(z: Array) -> Array:

@@ -15,7 +15,7 @@ from skidyn._checks import warn_about_log
 from skidyn._columns import Columns, ColumnSpec, resolve_columns, trajectory_numbers
 from skidyn._exceptions import ColumnError
 from skidyn._order import has_one_motion, order_in_time
-from skidyn._signals import Array, Signals, refuse_other_gravity, signals_from
+from skidyn._signals import Array, Signals, rates_of, refuse_other_gravity, signals_from
 from skidyn.effects import Term
 from skidyn.evidence import broken_notes, smooth_motion
 from skidyn.identification._recordings import Recordings, named_recordings, recognise
@@ -146,13 +146,9 @@ class Reading:
 
 def _differences(signals: Signals) -> Array:
     """Accelerations by differences, for pieces that are too short for the smoother."""
-    ddq = np.zeros_like(signals.dq)
-    for rows in signals.segments:
-        if rows.stop - rows.start > 1:
-            times = signals.clock[rows]
-            if np.all(np.diff(times) > 0):
-                ddq[rows] = np.gradient(signals.dq[rows], times, axis=0)
-    return ddq
+    time = signals.clock
+    advancing = [rows for rows in signals.segments if np.all(np.diff(time[rows]) > 0)]
+    return rates_of(signals.dq, time, advancing)
 
 
 def _warn_of_leakage() -> None:

@@ -209,6 +209,4 @@ class ErrorMapDisplay:
 
 def _reversal_margin(signals: Signals) -> int:
     """Samples around a reversal that count as part of it: a twentieth of a second."""
-    steps = np.diff(signals.clock)
-    steps = steps[steps > 0]
-    return max(1, round(0.05 / float(np.median(steps)))) if len(steps) else 1
+    return max(1, round(0.05 * signals.rate))

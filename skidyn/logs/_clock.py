@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from skidyn._exceptions import LogError
-from skidyn._signals import GAP_STEPS, find_segments
+from skidyn._signals import GAP_STEPS, find_segments, rates_of, runs_of
 from skidyn.logs._bounds import MAX_BYTES
 
 if TYPE_CHECKING:
@@ -388,10 +388,9 @@ def _rest_middles(
             still[begin] += 1
             still[ends[begin] + 1] -= 1
         resting = np.cumsum(still)[:-1] > 0
-        edges = np.flatnonzero(np.diff(np.r_[0, resting.astype(int), 0]))
         middles += [
             int(first + (begin + end) // 2)
-            for begin, end in zip(edges[::2], edges[1::2], strict=True)
+            for begin, end in zip(*runs_of(resting), strict=True)
             if begin > 0 and end < len(t)  # a rest at the border cuts nothing
         ]
     return middles
@@ -414,12 +413,11 @@ def _stays(q: np.ndarray, ends: np.ndarray, band: np.ndarray) -> np.ndarray:
 
 def derive_velocity(position: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
     """Central differences of the positions within each segment, which needs more than one row."""
-    velocity = np.empty_like(position)
-    for rows in find_segments(trajectory, time):
-        if rows.stop - rows.start < 2:
-            raise LogError(
-                f"row {rows.start} is isolated between gaps, so no velocity can be derived for "
-                "it; remove it or supply dq."
-            )
-        velocity[rows] = np.gradient(position[rows], time[rows], axis=0)
-    return velocity
+    segments = find_segments(trajectory, time)
+    alone = next((rows.start for rows in segments if rows.stop - rows.start < 2), None)
+    if alone is not None:
+        raise LogError(
+            f"row {alone} is isolated between gaps, so no velocity can be derived for it; remove "
+            "it or supply dq."
+        )
+    return rates_of(position, time, segments)

@@ -10,8 +10,8 @@ import numpy as np
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._measures import velocity_consistency
-from skidyn.measurement._suspicion import Suspicion
-from skidyn.measurement._units import NEAR, unit_remedy
+from skidyn.measurement._suspicion import Suspicion, remedy_of
+from skidyn.measurement._units import NEAR
 
 #: Slopes of integrated acceleration on velocity of a filtered or noisy acceleration, and the
 #: correlation below which it is another signal.
@@ -55,7 +55,7 @@ class Acceleration(Check):
         joints: list[int],
         slopes: list[tuple[float, float]],
     ) -> Suspicion:
-        names = ", ".join(measurement.joint(k) for k in joints)
+        names = measurement.joints(joints)
         numbers = ", ".join(f"{slope:.3g} (correlation {alike:.2f})" for slope, alike in slopes)
         evidence = (
             f"the acceleration is {numbers} times the differentiated velocity; models that are "
@@ -66,13 +66,12 @@ class Acceleration(Check):
         if cause == "sign":
             columns = [f"ddq{k + 1}" for k in joints]
             what = f"the acceleration of {names} has the opposite sign"
-            remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
+            remedy = remedy_of("flip", columns)
         elif cause == "degrees":
             what = f"accelerations look like degrees on {names}"
             every = len(joints) == measurement.n_joints
-            remedy = unit_remedy(
-                {"ddq": "deg/s^2"} if every else {f"ddq{k + 1}": "deg/s^2" for k in joints}
-            )
+            quantities = ["ddq"] if every else [f"ddq{k + 1}" for k in joints]
+            remedy = remedy_of("units", dict.fromkeys(quantities, "deg/s^2"))
         return self.suspicion(what, evidence, "suspected", joints, remedy)
 
 

@@ -9,11 +9,12 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array
+from skidyn._signals import Array, runs_of
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import SAMPLES, Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import position_step, runs_of
+from skidyn.measurement._measures import position_step
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
 
@@ -41,7 +42,7 @@ class DeadBand(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         found = dead_bands(measurement)
         if found:
-            names = ", ".join(measurement.joint(k) for k in found)
+            names = measurement.joints(found)
             told_shares = ", ".join(f"{share:.1%}" for share in found.values())
             yield self.suspicion(
                 f"the torque of {names} is reported as zero when it is small",
@@ -119,7 +120,7 @@ class TaredTorque(Check):
                     else "has zero mean in every recording: the mean was removed"
                 )
                 yield self.suspicion(
-                    f"the torque of {', '.join(measurement.joint(k) for k in joints)} {how}",
+                    f"the torque of {measurement.joints(joints)} {how}",
                     "the torque varies with gravity as the joints move, but the gravity torque "
                     + ("at the start" if what == "start" else "on average")
                     + " is missing; record the torque as measured, or add the gravity torque",
@@ -145,7 +146,7 @@ def _felt(fits: Fits, joint: int) -> bool:
     pull = np.tensordot(fits.robot.gravity, pulls, 1)
     _, speed, sign, _ = fits.columns(Reading()).transpose(1, 0, 2)
     table = np.column_stack([torque, *(x[:, joint] for x in (pull, still, speed, sign))])[counts]
-    runs = fits.signals.trajectory[::SAMPLES][counts]
+    runs = fits.recording[counts]
     for run in np.unique(runs):
         table[runs == run] -= table[runs == run].mean(axis=0)
     if table[:, 1].std() < HEAVY * torque.std():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array, find_segments
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Steps of motion beside a gap, in units of their usual scatter, from which a joint clearly moves.
 CLEAR = 4.0
@@ -131,5 +131,5 @@ class FalseGaps(Check):
             f"at {counts.sum()} gap(s) in time (in trajectories {shown}) joints move about as far "
             "as from any row to the next",
             "certain" if counts.sum() > 1 else "suspected",
-            remedy=("--clock regular", "clock='regular'"),
+            remedy=remedy_of("clock", "regular"),
         )

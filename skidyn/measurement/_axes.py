@@ -18,10 +18,12 @@ from skidyn.measurement._bodies import explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._divided import divided_zeros
 from skidyn.measurement._duel import duel_of
-from skidyn.measurement._fits import Fits, Outcome, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._near_bodies import NearBodies
-from skidyn.measurement._readings import DECISIVE, FEWEST_ROWS, HALF, MOST_ROWS, NEEDED, WEAKEST
+from skidyn.measurement._outcome import Outcome
+from skidyn.measurement._reading import Reading
+from skidyn.measurement._readings import DECISIVE, HALF, NEEDED, WEAKEST
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes
 from skidyn.robots import Robot
@@ -86,7 +88,7 @@ class Axes(Check):
         ):
             return
         gains = np.nan_to_num(found.fits.nominal(Reading()).gain)
-        inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+        inflation = fits.identified(Reading()).inflation
         here, there = (NearBodies(f, Reading(), gains, inflation) for f in (fits, found.fits))
         duel = duel_of(here, there, range(fits.n_joints))
         if duel.beside < (LEAST if found.confirmed > CONFIRMED else max(LEAST, BESIDE * duel.gain)):
@@ -152,7 +154,7 @@ def find_axes(fits: Fits) -> list[Axis]:
     robot, tree = fits.robot, fits.robot.tree
     if len(tree.parents) != robot.n_joints:
         return []  # bodies of mimic joints have no separate columns
-    few = fits.with_loads(False).thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+    few = fits.with_loads(False).few
     rough = few.nominal(Reading(), 1)
     every = np.vstack([np.eye(3), -np.eye(3)])
     tried: list[tuple[float, int, int, Array]] = []

@@ -13,7 +13,7 @@ from skidyn.measurement._around_zero import dead_bands
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import COARSE, is_short, step_of_values
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Share of rows at the extreme torque from which it is reported.
 CLIPPED = 0.002
@@ -96,7 +96,7 @@ class ConstantTorque(Check):
                 f"in {int(idle.sum())} rows, {idle.mean():.1%}, no torque changes: the drives "
                 "were not enabled, or their values arrived late",
                 "certain",
-                remedy=("--drop-repeated", "drop_repeated=True"),
+                remedy=remedy_of("drop_repeated", True),
             )
         number = measurement.signals.trajectory
         runs = np.unique(number)

@@ -12,7 +12,6 @@ from skidyn.measurement._bodies import (
     Bodies,
     ComputedTorque,
     NoFriction,
-    TorqueScale,
     UnexplainedTorque,
 )
 from skidyn.measurement._channels import (
@@ -58,6 +57,7 @@ from skidyn.measurement._smoothing import SmoothedTorque
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
 from skidyn.measurement._torque import Columns, UnsignedTorque
 from skidyn.measurement._torque_delay import TorqueDelay
+from skidyn.measurement._torque_scale import TorqueScale
 from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
 from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDelay
 

@@ -14,7 +14,7 @@ from skidyn.measurement._arrival import rows_after_false_gaps, without_false_gap
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import is_repeated
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Stamps closer to a regular clock than this share of a step do not jitter.
 REGULAR = 1e-3
@@ -251,7 +251,7 @@ class ClockJitter(Check):
                 f"{measurement.same_stamps} rows have the time stamp of the previous row although "
                 "joints have moved",
                 "certain",
-                remedy=("--clock regular", "clock='regular'"),
+                remedy=remedy_of("clock", "regular"),
             )
             return
         if len(measurement.steps) < 50 or np.any(measurement.steps <= 0) or measurement.lost:
@@ -293,7 +293,7 @@ class ClockJitter(Check):
                 f"steps a position follows from its neighbours up to {found.ratio:.3g} times as "
                 f"closely{says}",
                 "certain" if sure else "suspected" if harmful or closer else "noted",
-                remedy=("--clock regular", "clock='regular'"),
+                remedy=remedy_of("clock", "regular"),
             )
         elif measurement.jitter > 0.25:
             really = found.margin < -TOLD
@@ -314,7 +314,7 @@ def _gained_by_torque(measurement: Measurement) -> float | None:
     fits = measurement.fits
     if fits is None:
         return None
-    from skidyn.measurement._fits import Reading
+    from skidyn.measurement._reading import Reading
     from skidyn.measurement._rows import make_fits  # also imports the evidence
 
     signals = measurement.whole
@@ -344,7 +344,7 @@ class RepeatedRows(Check):
                 "move: the recorder polled faster than the robot reports, so derivatives are too "
                 "noisy",
                 "noted" if _coarse(measurement) else "certain" if share > MANY else "suspected",
-                remedy=("--drop-repeated", "drop_repeated=True"),
+                remedy=remedy_of("drop_repeated", True),
             )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from skidyn._signals import Array
+from skidyn._signals import Array, scatter
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import divided_differences
@@ -64,4 +64,4 @@ class CommandedMotion(Check):
 def _scatter(values: Array, time: Array, parts: list[slice]) -> Array:
     """Scatter of every channel, from differences that smooth functions do not have."""
     rest = [divided_differences(values[rows], time[rows], ORDER) for rows in parts]
-    return np.asarray(1.4826 * np.median(np.abs(np.concatenate(rest)), axis=0))
+    return np.asarray(scatter(np.concatenate(rest), axis=0))

@@ -14,10 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from skidyn._signals import Array
+from skidyn._signals import Array, scatter
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
 
@@ -136,7 +137,7 @@ def _noise(measurement: Measurement, joints: list[int]) -> Array | None:
     """Differences of the torques, which motion hardly reaches, cut at outliers."""
     torque, number = measurement.torque[:, joints], measurement.signals.trajectory
     noise = np.diff(torque, n=ORDER, axis=0)[number[ORDER:] == number[:-ORDER]]
-    spread = 1.4826 * np.median(np.abs(noise), axis=0)
+    spread = scatter(noise, axis=0)
     if len(noise) < 500 or len(joints) < 2 or not np.all(spread > 0):
         return None
     return np.asarray(np.clip(noise / spread, -CUT, CUT) * spread)

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
-from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction, lines_between
+from skidyn.measurement._fits import SAMPLES, Fits, friction, lines_between
 from skidyn.measurement._loads import LOAD, by_recording, n_loads
-from skidyn.measurement._peak import peak
-from skidyn.measurement._robust import FEWEST, RobustFit, fit_together
+from skidyn.measurement._peak import peak, vertex
+from skidyn.measurement._reading import Reading
+from skidyn.measurement._robust import FEWEST, RobustFit, fit_together, gains_of
 from skidyn.robots import base_parameter_index
 
 #: Lags that are tried, s, and those if the best is beyond them; number of groups of rows that are
@@ -155,14 +156,14 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
     unknown = Delay(
         np.nan, np.nan, np.full(n, np.nan), own_errors, 0.0, own_gains, halves, drifts=drifts
     )
-    s = fits.motion(Reading())
+    s = Reading().motion(fits.signals)
     every = np.arange(10 * fits.robot.n_bodies)
     regressor = fits.mean_regressor(fits.robot, s, every)
     shifted = [fits.average(fits.torque_at(lag)) for lag in lags_tried]
     tables, firsts, lags = [], [], np.full(n, np.nan)
     squares: dict[int, list[Array]] = {}
     counts: dict[int, int] = {}
-    run_of = s.trajectory[::SAMPLES]
+    run_of = fits.recording
     first = _first_half(fits)
     for j in range(n):
         use = _sliding(fits, s, j)
@@ -228,7 +229,9 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
     return found, beyond, runs_beyond
 
 
-def _run_costs(basis: Array, torque: Array, run_of: Array) -> Iterator[tuple[int, Array]]:
+def _run_costs(
+    basis: Array, torque: Array, run_of: NDArray[np.int64]
+) -> Iterator[tuple[int, Array]]:
     """Half the squared residual of every recording over noise, by lag, with the bodies of others.
 
     These are fitted at the lag at which they explain the other recordings best.
@@ -316,11 +319,11 @@ class JointFit:
 
     def __init__(self, fits: Fits, changed: Sequence[int]) -> None:
         self.fits, self.changed = fits, list(changed)
-        self.signals = s = fits.motion(Reading())
+        self.signals = s = Reading().motion(fits.signals)
         self.base = base_parameter_index(fits.robot)
         last = 10 * fits.robot.n_bodies + LOAD if fits.loads else LOAD[:0]
         regressor = fits.mean_regressor(fits.robot, s, np.append(self.base, last))
-        self.number = s.trajectory[::SAMPLES] if fits.loads else s.trajectory[::SAMPLES] * 0
+        self.number = fits.recording if fits.loads else 0 * fits.recording
         self.joints: list[int] = []
         self.designs: list[Array] = []
         self.places: list[NDArray[np.int64]] = []
@@ -439,16 +442,12 @@ def lag_gain(fits: Fits, lag: float, late: Sequence[int]) -> float:
         Joints, from 0.
     """
     together = JointFit(fits, late)
-    here, there = together.fit(fits.torque), together.fit(fits.torque_at(lag))
-    return sum(
-        (after.likelihood - before.likelihood) / max(after.inflation, 1.0)
-        for before, after in zip(here, there, strict=True)
-    )
+    return sum(gains_of(together.fit(fits.torque), together.fit(fits.torque_at(lag))))
 
 
 def _first_half(fits: Fits) -> NDArray[np.bool_]:
     """Rows in the first half of their recording."""
-    time, number = fits.average(fits.signals.clock), fits.signals.trajectory[::SAMPLES]
+    time, number = fits.average(fits.signals.clock), fits.recording
     first = np.zeros(fits.n_rows, dtype=bool)
     for run in np.unique(number):
         rows = number == run
@@ -523,6 +522,4 @@ def _bottom(cost: Array, k: int) -> float:
     """Minimum of a parabola through a cost and its neighbours, in units of their distance."""
     if k in (0, len(cost) - 1):
         return 0.0
-    left, middle, right = cost[k - 1 : k + 2]
-    bend = left - 2 * middle + right
-    return float(0.5 * (left - right) / bend) if bend > 0 else 0.0
+    return vertex(*-cost[k - 1 : k + 2]) or 0.0

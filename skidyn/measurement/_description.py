@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._plausible import (
     GRAMS,
@@ -25,7 +25,7 @@ from skidyn.measurement._plausible import (
     shape_of,
     wrong_units,
 )
-from skidyn.measurement._readings import FEWEST_ROWS, MOST_ROWS
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Certainty, Suspicion
 from skidyn.robots import Robot
 
@@ -76,7 +76,7 @@ def _decided(
     fits = Measurement(measurement.signals, measurement.torque, robot, measurement.joint_names).fits
     if fits is None or not any(fits.usable(k) for k in range(fits.n_joints)):
         return found, ""
-    fits = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+    fits = fits.few
     tried = [(own, _gain(fits, mended(robot, own))) for own in _readings(found)]
     heavier = [(own, _gain(fits, mended(robot, own))) for own in _with_masses(robot, found)]
     most = max(gain for _, gain in tried)

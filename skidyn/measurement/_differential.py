@@ -17,10 +17,11 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._robust import fit_admissible
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Log-likelihood that sum and difference must gain over any sign and order of the two torques, with
 #: the stated bodies, whose torque may be small beside friction, and with identified ones.
@@ -74,8 +75,7 @@ class MotorsOfDifferential(Check):
         if found is None:
             return
         measurement.mixed = True
-        names = " and ".join(measurement.joint(k) for k in found.joints)
-        words = ",".join(f"{name}={text}" for name, text in found.sums.items())
+        names = measurement.joints(found.joints)
         yield self.suspicion(
             f"the torques of {names} are those of the two motors of a differential",
             "their sum and difference agree with the torques of the stated bodies better than the "
@@ -84,7 +84,7 @@ class MotorsOfDifferential(Check):
             "gears of another ratio need a gain as well",
             "suspected",
             found.joints,
-            (f"--combine {words}", f"combine={found.sums}"),
+            remedy_of("combine", found.sums),
         )
 
 
@@ -121,7 +121,7 @@ def find_differential(fits: Fits) -> Differential | None:
     for share in SHARES:
         there = fitted(share * mixed).identified(Reading())
         # the density of two torques is that of their combinations times the determinant
-        spread = 0.5 * rows * np.log(2 * share**2) / max(*(there.inflation_of(k) for k in pair), 1)
+        spread = 0.5 * rows * np.log(2 * share**2) / max(there.inflation_of(k) for k in pair)
         judged.append((float(there.margin(here).sum() + spread), share))
     gain = max(judged)[0]
     if gain < SURE:
@@ -157,7 +157,7 @@ def _of_pair(fits: Fits, pair: tuple[int, int]) -> tuple[float, Array, Array]:
 
     plain, signs, _ = best(("own", "other"), ("other", "own"))
     mixed, factors, inflation = best(("sum", "difference"), ("difference", "sum"))
-    return (mixed - plain) / max(inflation, 1.0), factors, signs
+    return (mixed - plain) / inflation, factors, signs
 
 
 def _sum(row: Array, columns: list[str]) -> str:

@@ -19,11 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.measurement._bodies import CLEARLY, explained, joint_gain
+from skidyn._text import trajectories_told
+from skidyn.measurement._bodies import explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
-from skidyn.measurement._fits import SAMPLES, Fits, Outcome, Reading, lines_between
+from skidyn.measurement._fits import Fits, lines_between
+from skidyn.measurement._gains import CLEARLY, joint_gain
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._outcome import Outcome
+from skidyn.measurement._peak import climb
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._robust import fit_at_once, fit_together
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_gain
@@ -115,9 +120,8 @@ class DividedRecordings(Check):
             "scale": f"the torque of {name} is {best.value:.3g} times that of the others",
             "zero": f"the zero of {name} differs by about {np.rad2deg(best.value):.0f} deg",
         }[best.kind]
-        runs = ", ".join(map(str, best.runs))
         yield self.suspicion(
-            f"in trajectories {runs} {what}",
+            f"in {trajectories_told(best.runs)} {what}",
             "with this correction, identified bodies explain the torque of all trajectories better "
             f"by {best.gain:.0f} (log-likelihood) and leave {100 * best.drop:.0f} % less residual; "
             "fix these files, or diagnose them separately",
@@ -133,19 +137,13 @@ def _is_scale(fits: Fits, zero: Division) -> bool:
     return any(joint_gain(fits, k, float(gains[k]))[1] > zero.gain for k in odd)
 
 
-def _runs_of(fits: Fits) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Recording of every row, and the recordings."""
-    number = fits.signals.trajectory[::SAMPLES]
-    return number, np.unique(number)
-
-
 def _divided_torques(fits: Fits, joints: list[int]) -> Iterator[Division]:
     """Joints whose torque has one of two multiples."""
-    number, runs = _runs_of(fits)
+    runs = np.unique(fits.recording)
     columns, here = fits.columns(Reading()), fits.identified(Reading())
     for k in joints:
         y, use = fits.mean_torque(k)
-        rows = [use & (number == run) for run in runs]
+        rows = [use & (fits.recording == run) for run in runs]
         told = [i for i, own in enumerate(rows) if own.sum() >= FEWEST and np.any(y[own])]
         if len(told) < RECORDINGS:
             continue
@@ -156,7 +154,7 @@ def _divided_torques(fits: Fits, joints: list[int]) -> Iterator[Division]:
             continue
         others, value = split
         out = runs[[told[i] for i in np.flatnonzero(others)]]
-        odd = np.isin(number, out)
+        odd = np.isin(fits.recording, out)
         flexible = _flexible(fits, k)
         value = _refined(flexible, y[use], odd[use], value)
         if USUAL[0] < value < USUAL[1] or value == 0:
@@ -167,7 +165,7 @@ def _divided_torques(fits: Fits, joints: list[int]) -> Iterator[Division]:
         there = mended.identified(Reading())
         margin = there.margin(here)
         changed = float(odd[use].sum()) * np.log(abs(value))
-        margin[k] -= changed / max(there.inflation_of(k), 1.0)
+        margin[k] -= changed / there.inflation_of(k)
         after = mended.mean_torque(k)[0]
         drop = 1 - _left(there.residual[k], after[use]) / _left(here.residual[k], y[use])
         gain = float(margin.sum())
@@ -204,7 +202,7 @@ def _flexible_gain(columns: Array, y: Array, after: Array, changed: float) -> tu
     here, there = (fit_together([columns], place, [torque])[0] for torque in (y, after))
     gain = there.likelihood - here.likelihood - changed
     drop = 1 - _left(there.residual, after) / _left(here.residual, y)
-    return gain / max((there if gain > 0 else here).inflation, 1.0), drop
+    return gain / (there if gain > 0 else here).inflation, drop
 
 
 def _left(residual: Array, y: Array) -> float:
@@ -279,7 +277,7 @@ def divided_zeros(fits: Fits) -> Iterator[Division]:
     fits : Fits
         Rows.
     """
-    number, runs = _runs_of(fits)
+    runs = np.unique(fits.recording)
     turning = np.flatnonzero(~fits.signals.prismatic).tolist()
     if len(runs) < RECORDINGS or not turning:
         return
@@ -302,7 +300,7 @@ def divided_zeros(fits: Fits) -> Iterator[Division]:
 
 def _refined_zero(fits: Fits, tried: list[Tried]) -> Division | None:
     """The best of some zeros, as identified bodies need it; None if they do not."""
-    number, runs = _runs_of(fits)
+    runs = np.unique(fits.recording)
     here = fits.identified(Reading())
 
     def mended(k: int, angle: float, out: NDArray[np.int64]) -> Fits:
@@ -318,13 +316,8 @@ def _refined_zero(fits: Fits, tried: list[Tried]) -> Division | None:
     )
     if value < SURE:
         return None
-    step = np.deg2rad(10)
-    while step > np.deg2rad(1):
-        near, other = max((margin(k, a, out), a) for a in (angle - step, angle + step))
-        if near > value:
-            value, angle = near, other
-        else:
-            step /= 2
+    of_angle = partial(margin, k, out=out)
+    angle, value = climb(of_angle, angle, np.deg2rad(10), np.deg2rad(1))
     if abs(angle) < LEAST_ZERO:
         return None
     if 2 * len(out) > len(runs):
@@ -333,7 +326,7 @@ def _refined_zero(fits: Fits, tried: list[Tried]) -> Division | None:
     there = fixed.identified(Reading())
     worst = int(np.argmax(there.margin(here)))
     drop = 1 - float(_spread(there.residual[worst]) / _spread(here.residual[worst]))
-    if drop > DROP and _unlike_effects(fits, fixed, worst, np.isin(number, out)):
+    if drop > DROP and _unlike_effects(fits, fixed, worst, np.isin(fits.recording, out)):
         return Division("zero", k, tuple(map(int, out)), angle, value, drop)
     return None
 
@@ -378,7 +371,7 @@ def _likelihoods(
     Friction and the scale of every torque are common to all recordings, and fitted anew for every
     group: where many recordings differ, those of all of them are right for none.
     """
-    number, runs = _runs_of(fits)
+    runs = np.unique(fits.recording)
     plain, turned = (fits.columns(Reading(zero=zero)) for zero in ((), ((joint, angle),)))
     felt = [
         k
@@ -391,7 +384,7 @@ def _likelihoods(
         before = fit_at_once(plain[None, :, :, k], y[None], use[None])[0].likelihood
         columns = np.stack(
             [
-                np.where(np.isin(number, runs[g])[:, None], turned[..., k], plain[..., k])
+                np.where(np.isin(fits.recording, runs[g])[:, None], turned[..., k], plain[..., k])
                 for g in groups
             ]
         )

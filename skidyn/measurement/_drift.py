@@ -12,6 +12,7 @@ from skidyn._signals import Array
 from skidyn.measurement._delay import NEAR, Delay, JointFit
 from skidyn.measurement._fits import Fits
 from skidyn.measurement._peak import peak
+from skidyn.measurement._robust import gains_of
 
 #: How often the lag in the middle of recordings and its growth are refined in turn: they hardly
 #: influence each other.
@@ -77,10 +78,7 @@ def find_drift(fits: Fits, found: Delay) -> Drift | None:
         return None
     here = together.fit(fits.torque_at(lag))
     there = together.fit(fits.torque_at(middle + growth * (since - longest / 2)))
-    gains = tuple(
-        (after.likelihood - before.likelihood) / max(after.inflation, 1.0)
-        for before, after in zip(here, there, strict=True)
-    )
+    gains = tuple(gains_of(here, there))
     lag, growth = float(f"{middle - growth * longest / 2:.5f}"), float(f"{growth:.4g}")
     return Drift(lag, growth, gains)
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn.effects import Effect, get_effect, searched_kinds
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._near_bodies import (
     LOOSE,
     ExtraColumns,
@@ -26,6 +26,7 @@ from skidyn.measurement._near_bodies import (
     NearBodies,
     likely_load,
 )
+from skidyn.measurement._reading import Reading
 
 #: Number of effects that are examined in detail.
 FINALISTS = 4
@@ -69,7 +70,7 @@ def fight(fits: Fits, before: Reading, reading: Reading, joints: Sequence[int]) 
     """
     # both have the scale of the torque that the reading implies
     gains = np.nan_to_num(fits.nominal(reading).gain)
-    inflation = np.maximum(fits.identified(before).inflation, 1.0)
+    inflation = fits.identified(before).inflation
     here, there = (NearBodies(fits, r, gains, inflation) for r in (before, reading))
     return duel_of(here, there, joints)
 
@@ -95,6 +96,8 @@ def duel_of(
     plain = here.plain.posterior
     gain = there.plain.posterior - plain
     duel = Duel(gain, gain)
+    if gain <= 0:
+        return duel  # effects only make it smaller
     for effect, columns, cost in _likely(here, joints, but=but):
         with_it = here.fit(columns).posterior
         rival = with_it - cost - plain
@@ -128,7 +131,7 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[fl
     """
     reading = Reading()
     gains = np.nan_to_num(fits.nominal(reading).gain)
-    here = NearBodies(fits, reading, gains, np.maximum(fits.identified(reading).inflation, 1.0))
+    here = NearBodies(fits, reading, gains, fits.identified(reading).inflation)
     k = here.joints.index(joint)
     own = rows[here.rows[k]]
     effects = [*_likely(here, [joint]), *_likely(here, [joint], rows)]

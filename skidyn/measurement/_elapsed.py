@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
+from skidyn._text import trajectories_told
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._suspicion import Suspicion
@@ -228,7 +229,7 @@ class LostRows(Check):
             return  # then velocities have the wrong sign
         measurement.lost = True
         yield self.suspicion(
-            f"the rows of trajectories {', '.join(map(str, turned))} are in reversed order of time",
+            f"the rows of {trajectories_told(turned)} are in reversed order of time",
             "in nearly all their moving rows all joints move against their velocities at once, "
             "although friction opposes these velocities; reverse the rows of these recordings",
             "certain",

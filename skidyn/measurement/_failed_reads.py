@@ -13,8 +13,8 @@ from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import MANY_MISSING
-from skidyn.measurement._placeholder import CHANNELS, exactly, in_words, placeholder_remedy
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._placeholder import CHANNELS, in_words, placeholder_remedy
+from skidyn.measurement._suspicion import Suspicion, exactly
 
 #: Most rows of a failed read. How many times as far as the values before and after it are from
 #: each other, and as nine tenths of the other steps of the channel, it is from both; the same as a
@@ -134,8 +134,8 @@ def _placed(values: Array, trajectory: NDArray[np.int64]) -> dict[float, NDArray
     held, before, after = values[begins], values[begins - 1], values[ends]
     jump = np.minimum(np.abs(held - before), np.abs(held - after))
     away = jump > AWAY * np.abs(after - before)
-    if not away.any():
-        return {}
+    if np.unique(held[away], return_counts=True)[1].max(initial=0) < FEWEST:
+        return {}  # no value comes often enough
     near = np.zeros(len(values), dtype=int)
     near[begins[away] - 1] += 1  # the step to the value and all steps until the one from it
     near[ends[away]] -= 1

@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
 from skidyn.measurement._loads import LOAD, by_recording, n_loads, span
+from skidyn.measurement._outcome import Outcome
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._robust import (
     FEWEST,
     ROUNDS,
@@ -40,90 +42,10 @@ OWN = 4
 #: Log-likelihood that every coefficient of a load must gain on average: half the logarithm of some
 #: 150 rows, twice.
 LOADED = 5.0
+#: Rows of a first test at least, and at most over the number of joints.
+FEWEST_ROWS, MOST_ROWS = 150, 2800
 #: Number of motions whose columns are cached.
 KEPT = 2
-#: Parts of a reading that do not concern the motion.
-_PLAIN: dict[str, Any] = {"flip_torque": frozenset(), "torque_order": None}
-
-
-@dataclass(frozen=True)
-class Reading:
-    """A reading of the columns of a log; the default leaves them unchanged.
-
-    Attributes
-    ----------
-    flip_motion, flip_torque : frozenset of int
-        Joints, from 0, whose positions and velocities, or torques, have the opposite sign.
-    order, torque_order : tuple of int or None
-        Column of each joint: for all signals, and for the torque in addition.
-    summed : tuple of (int, int)
-        Joints whose position includes that of the previous joint, and its sign: angles relative to
-        the base, as for arms whose links are driven by parallelograms.
-    zero : tuple of (int, float)
-        Joints and their recorded positions at the robot's zero.
-    gravity : tuple of float or None
-        Gravity in the base frame, m/s^2; the robot's own if None.
-    size, stretch : float
-        Factors of positions, and of time, to be divided out.
-    sized : frozenset of int or None
-        Joints, from 0, whose positions have that factor; all if None.
-    """
-
-    flip_motion: frozenset[int] = frozenset()
-    flip_torque: frozenset[int] = frozenset()
-    order: tuple[int, ...] | None = None
-    torque_order: tuple[int, ...] | None = None
-    summed: tuple[tuple[int, int], ...] = ()
-    zero: tuple[tuple[int, float], ...] = ()
-    gravity: tuple[float, float, float] | None = None
-    size: float = 1.0
-    stretch: float = 1.0
-    sized: frozenset[int] | None = None
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Fit of a reading, by column of the recorded torque, for any assignment to joints.
-
-    Attributes
-    ----------
-    likelihood : ndarray of shape (n_joints,)
-        Log-likelihood.
-    gain : ndarray of shape (n_joints,)
-        Multiple of the robot's own torque; NaN of an identified fit.
-    residual : list of ndarray
-        Residual of the rows of every column, N m or N.
-    scale : ndarray of shape (n_joints,)
-        Scale of the residual.
-    fits : dict of int to RobustFit
-        Fits by column; of the others, all is zero, and scales are one.
-    """
-
-    likelihood: Array
-    gain: Array
-    residual: list[Array]
-    scale: Array
-    fits: dict[int, RobustFit]
-
-    def margin(self, other: Outcome) -> Array:
-        """Log-likelihood gain of this reading over another, by joint.
-
-        The correlation of neighbouring rows is that of the more likely one, so that the gain of the
-        other over this one is the same with the opposite sign.
-        """
-        change = self.likelihood - other.likelihood
-        for column, gained in enumerate(change > 0):
-            change[column] /= max((self if gained else other).inflation_of(column), 1.0)
-        return np.asarray(change)
-
-    def inflation_of(self, column: int) -> float:
-        """Overestimation of a likelihood due to correlated neighbouring rows; few are needed."""
-        return self.fits[column].inflation if column in self.fits else 1.0
-
-    @property
-    def inflation(self) -> Array:
-        """The same of every column, shape (n_joints,)."""
-        return np.array([self.inflation_of(column) for column in range(len(self.gain))])
 
 
 @dataclass(frozen=True)
@@ -175,7 +97,9 @@ class Fits:
     _rubbed: dict[Reading, list[Array]] = field(default_factory=dict, repr=False)
     _carried: dict[tuple[Reading, int], Array] = field(default_factory=dict, repr=False)
     _parts: dict[Reading, tuple[Array, Array]] = field(default_factory=dict, repr=False)
-    _fitted: dict[tuple[Any, ...], RobustFit] = field(default_factory=dict, repr=False)
+    _fitted: dict[tuple[Reading, int], dict[tuple[int, int, float], RobustFit]] = field(
+        default_factory=dict, repr=False
+    )
     _felt: dict[Reading, list[tuple[Array, NDArray[np.int64]]]] = field(
         default_factory=dict, repr=False
     )
@@ -205,6 +129,11 @@ class Fits:
         if step < 2:
             return self
         return self.only(np.arange(self.n_rows) % step == 0)
+
+    @property
+    def few(self) -> Fits:
+        """Few of the rows, for a first test, of which a robot with more joints needs fewer."""
+        return self.thinned(max(FEWEST_ROWS, MOST_ROWS // self.n_joints))
 
     def _anew(self, **changes: Any) -> Fits:
         """Changed rows, of which nothing has been fitted."""
@@ -248,10 +177,10 @@ class Fits:
 
     def with_gravity(self, reading: Reading) -> Fits:
         """The same rows with the gravity torque of the stated bodies added."""
-        pull = self.robot.gravity_torque(self.motion(reading).q)
+        pull = self.robot.gravity_torque(reading.motion(self.signals).q)
         torque = self.torque.copy()
         for joint in range(self.n_joints):
-            column, sign = self.torque_column(reading, joint)
+            column, sign = reading.torque_column(joint)
             torque[:, column] += sign * pull[:, joint]
         return self.with_torque(torque)
 
@@ -260,6 +189,11 @@ class Fits:
         """Number of rows."""
         return len(self.moving)
 
+    @property
+    def recording(self) -> NDArray[np.int64]:
+        """Number of the recording of every row."""
+        return self.signals.trajectory[::SAMPLES]
+
     def average(self, values: Array) -> Array:
         """Mean of every row, from values at every sample."""
         rows = values.reshape(-1, SAMPLES, *values.shape[1:])
@@ -267,36 +201,6 @@ class Fits:
         for k in range(1, SAMPLES):
             total += rows[:, k]
         return np.asarray(total / SAMPLES)
-
-    def motion(self, reading: Reading) -> Signals:
-        """Motion in a reading."""
-        order = slice(None) if reading.order is None else list(reading.order)
-        sign = np.ones(self.n_joints)
-        sign[list(reading.flip_motion)] = -1
-        zero = np.zeros(self.n_joints)
-        for joint, value in reading.zero:
-            zero[joint] = value
-        s = self.signals
-        faster = reading.stretch
-        size = np.full(self.n_joints, reading.size)
-        if reading.sized is not None:
-            size[[j for j in range(self.n_joints) if j not in reading.sized]] = 1.0
-        q, dq, ddq = (
-            values[:, order] * (sign * faster**k / size)
-            for k, values in enumerate((s.q, s.dq, s.ddq))
-        )
-        if reading.summed:
-            apart = np.eye(self.n_joints)
-            for joint, before in reading.summed:
-                apart[joint - 1, joint] = -before
-            q, dq, ddq = q @ apart, dq @ apart, ddq @ apart
-        return s.with_(q=q - zero, dq=dq, ddq=ddq)
-
-    def torque_column(self, reading: Reading, joint: int) -> tuple[int, float]:
-        """Column of the torque of a joint, and its sign."""
-        column = joint if reading.torque_order is None else reading.torque_order[joint]
-        column = column if reading.order is None else reading.order[column]
-        return column, -1.0 if joint in reading.flip_torque else 1.0
 
     def torque_at(self, lag: float | Array) -> Array:
         """Torque that was recorded a lag (s) after the motion of every sample, or lags of them."""
@@ -325,11 +229,11 @@ class Fits:
 
     def nominal(self, reading: Reading, rounds: int = ROUNDS) -> Outcome:
         """Fit with the bodies of the robot's description."""
-        read = [(j, *self.torque_column(reading, j)) for j in range(self.n_joints)]
+        read = [(j, *reading.torque_column(j)) for j in range(self.n_joints)]
         read = [key for key in read if self.usable(key[1])]
-        fits = self._joint_fits(replace(reading, **_PLAIN), read, rounds)
+        fits = self._joint_fits(reading.of_motion, read, rounds)
         columns = [column for _, column, _ in read]
-        outcome = self._spread(columns, fits)
+        outcome = Outcome.of(self.n_joints, columns, fits)
         outcome.gain[columns] = [fit.coefficients[0] for fit in fits]
         return outcome
 
@@ -337,7 +241,8 @@ class Fits:
         self, motion: Reading, read: Sequence[tuple[int, int, float]], rounds: int
     ) -> list[RobustFit]:
         """Fits of joints to columns of the torque; readings share most of these fits."""
-        new = [key for key in read if (motion, *key, rounds) not in self._fitted]
+        known = self._fitted.setdefault((motion, rounds), {})
+        new = [key for key in read if key not in known]
         if new:
             joints, columns, signs = (np.array(x) for x in zip(*new, strict=True))
             own = self.columns(motion)[:, :, joints].transpose(2, 0, 1)
@@ -351,9 +256,8 @@ class Fits:
                     fit_admissible(a[w], t[w], rounds) for a, t, w in zip(own, y, use, strict=True)
                 ]
             )
-            for key, fit in zip(new, found, strict=True):
-                self._fitted[motion, *key, rounds] = fit
-        return [self._fitted[motion, *key, rounds] for key in read]
+            known.update(zip(new, found, strict=True))
+        return [known[key] for key in read]
 
     def _beside_loads(
         self,
@@ -374,10 +278,9 @@ class Fits:
         if key not in self._carried:
             while len(self._carried) >= KEPT:
                 del self._carried[next(iter(self._carried))]
-            robot, s = self._robot(motion), self.motion(motion)
+            robot, s = self._robot(motion), motion.motion(self.signals)
             felt = self.mean_regressor(robot, s, 10 * robot.n_bodies + LOAD, samples)
-            number = s.trajectory[::SAMPLES]
-            every = by_recording(felt.reshape(self.n_rows, -1), number)
+            every = by_recording(felt.reshape(self.n_rows, -1), self.recording)
             self._carried[key] = every.reshape(self.n_rows, -1, *felt.shape[1:])
         carried = self._carried[key]
         own, y = own.copy(), y.copy()
@@ -393,10 +296,10 @@ class Fits:
 
         Of a slider, the fit does not separate the mass from the inertia of its rotor.
         """
-        there, own = self.nominal(reading), self.columns(replace(reading, **_PLAIN))[:, 0]
+        there, own = self.nominal(reading), self.columns(reading.of_motion)[:, 0]
         offsets = [0.0]
         for j in range(self.n_joints):
-            column, sign = self.torque_column(reading, j)
+            column, sign = reading.torque_column(j)
             if column in there.fits:
                 left = (sign * self._mean_torque[:, column] - own[:, j])[self.moving[:, column]]
                 offsets.append(abs(float(np.median(left))) / there.fits[column].scale)
@@ -409,7 +312,7 @@ class Fits:
     def columns(self, motion: Reading) -> Array:
         """Mean columns of every joint, shape (n_rows, 4, n_joints)."""
         if motion not in self._moved:
-            s = self.motion(motion)
+            s = motion.motion(self.signals)
             parts = [self._own_torque(motion, s), *self._friction(motion, s)]
             while len(self._moved) >= KEPT:  # readings are tried one after another
                 del self._moved[next(iter(self._moved))]
@@ -434,7 +337,9 @@ class Fits:
     def _unstretched(self, motion: Reading, s: Signals) -> Signals:
         """Motion of a reading without its other rate, which is that of friction in any case."""
         direction = math.copysign(1.0, motion.stretch)
-        return s if motion.stretch == direction else self.motion(replace(motion, stretch=direction))
+        if motion.stretch == direction:
+            return s
+        return replace(motion, stretch=direction).motion(self.signals)
 
     def _own_torque(self, motion: Reading, s: Signals) -> Array:
         """Mean torque of the robot as described, in rows."""
@@ -459,9 +364,9 @@ class Fits:
         still : ndarray of shape (n_rows, n_joints)
         pulls : ndarray of shape (3, n_rows, n_joints)
         """
-        motion = replace(motion, gravity=None, **_PLAIN)
+        motion = replace(motion.of_motion, gravity=None)
         if motion not in self._parts:
-            s = self.motion(motion)
+            s = motion.motion(self.signals)
             robot, none = self.robot, (0.0, 0.0, 0.0)
             still = robot.inverse_dynamics(s.q, s.dq, s.ddq, gravity=none, backend="once")
             axes = map(tuple, np.eye(3))
@@ -478,7 +383,7 @@ class Fits:
 
     def _identified(self, reading: Reading) -> Outcome:
         columns, designs, places, targets = self._designs(reading)
-        return self._spread(columns, fit_together(designs, places, targets))
+        return Outcome.of(self.n_joints, columns, fit_together(designs, places, targets))
 
     def predicted_without(
         self, parts: Iterable[NDArray[np.bool_]]
@@ -530,7 +435,7 @@ class Fits:
 
     def residuals(self, bodies: Array, reading: Reading) -> dict[int, Array]:
         """Residual torque of identified coefficients for every joint, in some reading."""
-        robot, s = self._robot(reading), self.motion(reading)
+        robot, s = self._robot(reading), reading.motion(self.signals)
         base = base_parameter_index(robot)
         parameters, own = np.zeros((robot.n_bodies, 10)), np.zeros((self.n_joints, OWN))
         parameters.flat[base] = bodies[: len(base)]
@@ -538,10 +443,10 @@ class Fits:
         # Torque itself, not the columns of all bodies, of which these coefficients are the sum.
         rigid = self.average(robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=parameters))
         left = {}
-        for j, (column, sign) in enumerate(self.torque_column(reading, j) for j in range(len(own))):
+        for j, (column, sign) in enumerate(reading.torque_column(j) for j in range(len(own))):
             if self.usable(column, 1):
                 y, use = self.mean_torque(column)
-                predicted = rigid[:, j] + self._own_columns(s, j) @ own[j]
+                predicted = rigid[:, j] + self._own_columns(reading, s, j) @ own[j]
                 left[column] = sign * y[use] - predicted[use]
         return left
 
@@ -551,16 +456,17 @@ class Fits:
             return self.robot
         return replace(self.robot, gravity=np.asarray(reading.gravity))
 
-    def _own_columns(self, s: Signals, joint: int) -> Array:
+    def _own_columns(self, motion: Reading, s: Signals, joint: int) -> Array:
         """Mean columns of a joint in addition to those of the bodies, shape (n_rows, OWN)."""
-        return self.average(np.column_stack([friction(s, joint), np.ones(len(s.q))]))
+        rubs = [column[:, joint] for column in self._friction(motion, s)]
+        return np.column_stack([*rubs, np.ones(self.n_rows)])
 
     def _designs(
         self, reading: Reading
     ) -> tuple[list[int], list[Array], list[NDArray[np.int64]], list[Array]]:
         """Columns of the torque, and designs, places of coefficients and targets of their fit."""
-        felt = self._felt_columns(replace(reading, **_PLAIN))
-        read = [self.torque_column(reading, j) for j in range(self.n_joints)]
+        felt = self._felt_columns(reading.of_motion)
+        read = [reading.torque_column(j) for j in range(self.n_joints)]
         joints = [j for j, (column, _) in enumerate(read) if self.usable(column)]
         designs, places, targets = [], [], []
         for j in joints:
@@ -582,17 +488,18 @@ class Fits:
         """
         if motion not in self._felt:
             self._felt.clear()
-            robot, s = self._robot(motion), self.motion(motion)
-            base, rubs = base_parameter_index(robot), self._unstretched(motion, s)
+            robot, s = self._robot(motion), motion.motion(self.signals)
+            base = base_parameter_index(robot)
             last = 10 * robot.n_bodies + LOAD if self.loads else LOAD[:0]
             regressor = self.mean_regressor(robot, s, np.append(base, last))
-            number, found = s.trajectory[::SAMPLES], []
+            found = []
             first = len(base) + OWN * self.n_joints
             for j in range(self.n_joints):
                 felt = np.flatnonzero(regressor[:, j, : len(base)].any(axis=0))  # moved bodies
-                columns = np.hstack([regressor[:, j][:, felt], self._own_columns(rubs, j)])
+                own = self._own_columns(motion, s, j)
+                columns = np.hstack([regressor[:, j][:, felt], own])
                 place = np.append(felt, len(base) + OWN * j + np.arange(OWN))
-                carried = by_recording(regressor[:, j, len(base) :], number)
+                carried = by_recording(regressor[:, j, len(base) :], self.recording)
                 if carried.size and regressor[:, j, len(base) :].any():
                     columns = np.hstack([columns, carried])
                     place = np.append(place, first + np.arange(carried.shape[1]))
@@ -615,15 +522,6 @@ class Fits:
             for rows, regressor in robot.iter_torque_regressor(q, dq, ddq):
                 total[:, :, rows] += regressor[:, index]
         return np.moveaxis(total / len(samples), 2, 0)
-
-    def _spread(self, columns: Sequence[int], fits: Sequence[RobustFit]) -> Outcome:
-        n = self.n_joints
-        likelihood, scale = np.zeros(n), np.ones(n)
-        residual = [np.zeros(0) for _ in range(n)]
-        for c, fit in zip(columns, fits, strict=True):
-            likelihood[c], scale[c], residual[c] = fit.likelihood, fit.scale, fit.residual
-        of = dict(zip(columns, fits, strict=True))
-        return Outcome(likelihood, np.full(n, np.nan), residual, scale, of)
 
 
 def friction(signals: Signals, joint: int) -> Array:

@@ -10,13 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import SAMPLES, Fits, Reading
-from skidyn.measurement._loads import FEW_RUNS, MOST_RUNS
+from skidyn.measurement._fits import Fits, friction
+from skidyn.measurement._loads import by_recording
 from skidyn.measurement._near_bodies import ExtraColumns, Factored, NearBodies, likely_load
+from skidyn.measurement._peak import climb
+from skidyn.measurement._reading import Reading
+from skidyn.measurement._robust import fit_admissible
 
 #: Most steps, the largest one, and the one that ends them.
 STEPS, FARTHEST, CLOSE = 8, 0.3, 1e-3
@@ -29,6 +33,13 @@ KNOWN_TO = 0.5
 #: which factors of several torques are the same where they are known to a tenth; standard errors
 #: up to which one that is not may be the same.
 ROUND, NEARLY, ALIKE, KNOWN, FAR = 1.5, 0.01, 0.1, 0.1, 3.0
+#: Multiples of the robot's own torque that may be due to wrong masses.
+USUAL = (0.4, 2.5)
+#: Multiples that are attributed to wrong masses unless the other joints contradict.
+CLEARLY = (0.62, 1.6)
+#: Least share of a torque's spread that the robot must explain for its multiple to be known.
+EXPLAINED = 0.5
+AS_IT_IS = Reading()
 
 
 @dataclass(frozen=True)
@@ -81,7 +92,7 @@ def refined_scales(fits: Fits, gains: Mapping[int, float], free: Mapping[int, fl
         of ``gains``.
     """
     fits = fits.with_loads(False)  # which are columns of their own here
-    inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+    inflation = fits.identified(Reading()).inflation
     now = np.ones(fits.n_joints)
     for k, gain in {**gains, **free}.items():
         now[k] = gain
@@ -89,7 +100,8 @@ def refined_scales(fits: Fits, gains: Mapping[int, float], free: Mapping[int, fl
     near = NearBodies(fits, Reading(), np.ones(fits.n_joints), inflation)
     torques = [fits.mean_torque(k)[0][use] for k, use in zip(near.joints, near.rows, strict=True)]
     stated = [y - target for y, target in zip(torques, near.targets, strict=True)]
-    loads, n_loads = _loads(fits, near)
+    loads = _loads(fits, near)
+    n_loads = loads[near.joints[0]].shape[1] if near.joints else 0
     precision = np.append(np.ones(n_loads), np.full(len(joints), KNOWN_TO**-2))
     errors = np.full(len(joints), KNOWN_TO)
     for _ in range(STEPS if joints else 0):
@@ -132,21 +144,15 @@ def _middle(values: Array, weights: Array) -> float:
     return float(values[order][np.searchsorted(share, 0.5)])
 
 
-def _loads(fits: Fits, near: NearBodies) -> tuple[dict[int, Array], int]:
+def _loads(fits: Fits, near: NearBodies) -> dict[int, Array]:
     """Columns of a load on the last body that differs from recording to recording, by joint.
 
     A payload of one recording would otherwise be scales of the joints that carry it.
     """
-    run_of = fits.signals.trajectory[::SAMPLES]
-    runs = np.unique(run_of)
-    runs = runs[1:] if FEW_RUNS < len(runs) <= MOST_RUNS else runs[:0]
-    if not len(runs):
-        return {j: np.zeros((fits.n_rows, 0)) for j in near.joints}, 0
     size = likely_load(fits.robot)
     last = np.arange(near.n_bodies - len(size), near.n_bodies)
-    load = fits.mean_regressor(fits.robot, fits.motion(Reading()), last) * size
-    columns = np.concatenate([load * (run_of == run)[:, None, None] for run in runs], axis=2)
-    return {j: columns[:, j] for j in near.joints}, columns.shape[2]
+    load = fits.mean_regressor(fits.robot, Reading().motion(fits.signals), last) * size
+    return {j: by_recording(load[:, j], fits.recording) for j in near.joints}
 
 
 def _rounded(factor: float, error: float) -> float:
@@ -155,3 +161,56 @@ def _rounded(factor: float, error: float) -> float:
     best = min(near, key=lambda x: abs(x / factor - 1))
     within = abs(best / factor - 1) < min(NEARLY, ROUND * error)
     return float(f"{best:.6g}" if within else f"{factor:.4g}")
+
+
+def scale_gain(fits: Fits, k: int, gain: float) -> float:
+    """Log-likelihood gain of another scale of one torque, with bodies that all joints share."""
+    other = fits.scaled({k: gain}).identified(Reading())
+    # the density of a torque is that of the scaled torque divided by the gain
+    change = other.margin(fits.identified(Reading()))
+    rows = float(fits.moving[:, k].sum())
+    change[k] -= rows * np.log(gain) / other.inflation_of(k)
+    return float(change.sum())
+
+
+def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float]:
+    """Scale of one torque at which identified bodies, which all joints share, explain it best.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    k : int
+        Joint, from 0.
+    gain : float
+        Ratio of its torque to that of the stated bodies.
+
+    Returns
+    -------
+    gain, gained : float
+        Scale, and its log-likelihood gain over none.
+    """
+
+    @cache  # a search comes back to where it was
+    def at(place: float) -> float:
+        return scale_gain(fits, k, float(np.exp(np.log(gain) + 0.01 * place)))
+
+    step = 8  # maxima are narrow if the noise is small
+    first = max(range(-5 * step, 6 * step, step), key=lambda place: (at(place), place))
+    place, best = climb(at, first, step, 0.5)
+    return float(np.exp(np.log(gain) + 0.01 * place)), best
+
+
+def known_gains(fits: Fits, reading: Reading = AS_IT_IS) -> dict[int, float]:
+    """Multiple of the robot's own torque, for columns of which it explains enough."""
+    here = fits.nominal(reading)
+    s = reading.motion(fits.signals)
+    known = {}
+    for k in range(fits.n_joints):
+        if not fits.usable(k) or not here.gain[k] > 0:
+            continue
+        y, use = fits.mean_torque(k)
+        bare = fit_admissible(fits.average(friction(s, k))[use], y[use])
+        if here.scale[k] ** 2 < (1 - EXPLAINED) * bare.scale**2 * (1 - EXPLAINED):
+            known[k] = float(here.gain[k])
+    return known

@@ -17,10 +17,10 @@ from skidyn.measurement._measures import (
     RECURS,
     STRIDE,
     is_held,
-    position_step,
+    step_of_values,
 )
 from skidyn.measurement._placeholder import placeholder_remedy
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Least share of rows with the torque of the previous row, for a torque that is not coarse.
 HELD = 0.3
@@ -51,7 +51,7 @@ class HeldTorque(Check):
                 f"in {share:.0%} of the rows in which positions change, all of them at once: they "
                 "are reported less often",
                 "certain",
-                remedy=("--drop-repeated", "drop_repeated=True"),
+                remedy=remedy_of("drop_repeated", True),
             )
             return
         shares, lost = np.zeros(measurement.n_joints), measurement.clipped
@@ -64,8 +64,7 @@ class HeldTorque(Check):
         held = np.flatnonzero(shares)
         if len(held):
             yield self.suspicion(
-                f"the torque of {', '.join(measurement.joint(int(k)) for k in held)} holds its "
-                "last value",
+                f"the torque of {measurement.joints(held)} holds its last value",
                 f"in {100 * shares[held].max():.0f} % of the rows in which positions change: it is "
                 "reported less often",
                 "suspected",
@@ -79,10 +78,11 @@ def _comes_in_steps(values: Array) -> bool:
     changes = changes[changes > 0]
     if not len(changes):
         return True
-    step = position_step(values)
+    distinct = np.unique(values)
+    step = step_of_values(distinct)
     if np.isfinite(step) and np.median(changes) < CATCHES * step:
         return True
-    return len(np.unique(values)) < RECURS * len(changes)
+    return len(distinct) < RECURS * len(changes)
 
 
 def _accelerates(position: Array) -> NDArray[np.bool_]:
@@ -111,13 +111,13 @@ class HeldVelocity(Check):
             q, dq = s.q[:, k], s.dq[:, k]
             # the velocity of a joint at rest, or at constant speed, does not change
             moved = together & (q[1:] != q[:-1]) & (dq[1:] != 0) & _accelerates(q)
-            if not measurement.excited[k] or moved.sum() < 50 or _comes_in_steps(dq):
-                continue  # a constant one, too
+            if not measurement.excited[k] or moved.sum() < 50:
+                continue
             share = float(np.mean(dq[1:][moved] == dq[:-1][moved]))
-            if share > HELD:
+            if share > HELD and not _comes_in_steps(dq):  # nor is it constant
                 shares[k] = share
         if shares:
-            names = ", ".join(map(measurement.joint, shares))
+            names = measurement.joints(shares)
             columns = [f"dq{k + 1}" for k in shares]
             yield self.suspicion(
                 f"the velocity of {names} holds its last value",
@@ -125,7 +125,7 @@ class HeldVelocity(Check):
                 "accelerates: it is reported less often",
                 "suspected",
                 list(shares),
-                (f"--derive {','.join(columns)}", f"derive={columns}"),
+                remedy_of("derive", columns),
             )
 
 
@@ -204,7 +204,7 @@ class MissingTorque(Check):
         joints = np.flatnonzero(missing.any(axis=0)).tolist()
         if joints and not measurement.lost:
             rows = missing.any(axis=1)
-            names = ", ".join(measurement.joint(k) for k in joints)
+            names = measurement.joints(joints)
             yield self.suspicion(
                 f"missing torques of {names} were replaced by zero",
                 f"in {int(rows.sum())} rows, {rows.mean():.1%} (the first in row "

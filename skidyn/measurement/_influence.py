@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import Reading
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._robust import fit_admissible
 
 #: Rows of the fits: as for other first tests, more would not change an order.

@@ -14,9 +14,10 @@ import numpy as np
 
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import duel_of
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._near_bodies import LOOSE, ExtraColumns, Factored, NearBodies
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_changes, readable_fits
 
@@ -85,7 +86,7 @@ def find_without_gravity(fits: Fits) -> list[tuple[int, float, float, float]]:
     fits : Fits
         Rows.
     """
-    gravity = fits.robot.gravity_torque(fits.motion(Reading()).q)
+    gravity = fits.robot.gravity_torque(Reading().motion(fits.signals).q)
     pull = fits.average(gravity)
     fits = fits.loaded()
     torque = fits.torque + gravity
@@ -102,7 +103,7 @@ def find_without_gravity(fits: Fits) -> list[tuple[int, float, float, float]]:
             promising.append(k)
     if not promising:
         return []
-    inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+    inflation = fits.identified(Reading()).inflation
     gains, found = np.ones(fits.n_joints), []
     here = NearBodies(fits, Reading(), gains, inflation)
     for k in promising:

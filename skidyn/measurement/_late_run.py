@@ -48,7 +48,7 @@ def find_late_run(score: Score) -> LateRun | None:
         Fit of all joints.
     """
     fits = score.fits
-    number = fits.signals.trajectory[::SAMPLES]
+    number = fits.recording
     runs = np.unique(number)
     if len(runs) < RECORDINGS or not score.joints:
         return None

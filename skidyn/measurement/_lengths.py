@@ -18,9 +18,10 @@ from skidyn._signals import Array
 from skidyn.measurement._channels import NOISELESS
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import duel_of
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._near_bodies import LOOSE, ExtraColumns, Factored, NearBodies
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
 from skidyn.robots import Robot
@@ -162,7 +163,7 @@ def find_lengths(fits: Fits) -> Stretched | None:
     bodies = np.flatnonzero(long & (tree.parents >= 0)).tolist()
     if not bodies or not np.any(fits.robot.inertial_parameters):
         return None
-    inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+    inflation = fits.identified(Reading()).inflation
     gains = np.ones(fits.n_joints)
     here = there = NearBodies(fits, Reading(), gains, inflation)
     factors: Array = np.zeros(len(bodies))

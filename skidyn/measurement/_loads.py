@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 
-#: Parameters of the last body of which a load consists, its mass and first moments, from the end;
-#: numbers of recordings that may carry loads of their own.
+#: Parameters of the last body of which a load consists, its mass and first moments, from the end.
 LOAD = np.arange(-10, -6)
-FEW_RUNS, MOST_RUNS = 1, 8
+#: Most recordings that may carry loads of their own.
+MOST_RUNS = 8
 
 
 def n_loads(number: NDArray[np.int64]) -> int:
@@ -23,7 +23,7 @@ def n_loads(number: NDArray[np.int64]) -> int:
         Recording of every row.
     """
     n = len(np.unique(number))
-    return len(LOAD) * (n - 1) if FEW_RUNS < n <= MOST_RUNS else 0
+    return len(LOAD) * (n - 1) if 1 < n <= MOST_RUNS else 0
 
 
 def by_recording(columns: Array, number: NDArray[np.int64]) -> Array:

@@ -12,8 +12,9 @@ from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._delay import NEAR, JointFit
 from skidyn.measurement._fits import Fits
+from skidyn.measurement._peak import climb, vertex
 from skidyn.measurement._robust import robust_likelihood
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Time constants that are tried, in lags that a delay in its place has; steps of their logarithm
 #: that are halved, and the least one.
@@ -46,7 +47,7 @@ def suspect_lowpass(
         evidence,
         "suspected",
         joints,
-        (f"--lowpass {column}={value:g}", f"lowpass={{'{column}': {value:g}}}"),
+        remedy_of("lowpass", {column: value}),
     )
 
 
@@ -83,14 +84,8 @@ def summit(likelihood: Callable[[float], float], tried: Sequence[float]) -> tupl
     tried : sequence of float
         Initial values.
     """
-    best, log = max((likelihood(x), float(np.log(x))) for x in tried)
-    step = STEP
-    while step > LEAST_STEP:
-        near, other = max((likelihood(float(np.exp(x))), x) for x in (log - step, log + step))
-        if near > best:
-            best, log = near, other
-        else:
-            step /= 2
+    _, log = max((likelihood(x), float(np.log(x))) for x in tried)
+    log, best = climb(lambda log: likelihood(float(np.exp(log))), log, STEP, LEAST_STEP)
     return float(np.exp(log)), best
 
 
@@ -146,8 +141,7 @@ def lowpass_of_torque(fits: Fits, lag: float, late: Sequence[int]) -> tuple[floa
         left, middle, right = (
             together.likelihood(other.torque_at(shift)) for shift in (-NEAR, 0.0, NEAR)
         )
-        bend = 2 * middle - left - right
-        return float(np.clip(0.5 * (right - left) / bend, -1, 1)) * NEAR if bend > 0 else 0.0
+        return float(np.clip(vertex(left, middle, right) or 0.0, -1, 1)) * NEAR
 
     constant, best = summit(filtered, [share * lag for share in TRIED])
     _, other = summit(delayed, [share * lag for share in (0.8, 1.0, 1.2)])

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array, Signals
+from skidyn._signals import Array, Signals, rates_of
+from skidyn._text import listed
 from skidyn.measurement._measures import (
     COARSE,
     excited,
@@ -26,10 +27,10 @@ from skidyn.measurement._measures import (
 )
 
 if TYPE_CHECKING:
+    from skidyn.measurement._changes import Change
     from skidyn.measurement._delay import Delay
     from skidyn.measurement._divided import Division
     from skidyn.measurement._fits import Fits
-    from skidyn.measurement._readings import Change
     from skidyn.measurement._servo_limits import Servo
     from skidyn.robots import Robot
 
@@ -162,8 +163,8 @@ class Measurement:
             Rows that were not read.
         """
         s, left = self.recorded, self.recorded.take(~rows)
-        if np.allclose(s.dq, _differences(s)):
-            left = left.with_(dq=_differences(left))
+        if np.allclose(s.dq, rates_of(s.q, s.clock, s.segments)):
+            left = left.with_(dq=rates_of(left.q, left.clock, left.segments))
         self.signals, self.torque = left, self.torque[~rows]
         self._forget()
         self.__post_init__()
@@ -199,6 +200,21 @@ class Measurement:
         """
         name = str(self.joint_names[k])
         return name if name == f"joint {k + 1}" else f"joint {k + 1} ({name})"
+
+    def joints(self, joints: Iterable[int]) -> str:
+        """Names of several joints for a sentence.
+
+        Parameters
+        ----------
+        joints : iterable of int
+            Joints, counted from 0.
+
+        Returns
+        -------
+        str
+            As of :meth:`joint`, joined by commas and "and".
+        """
+        return listed([self.joint(int(k)) for k in joints])
 
     @cached_property
     def steps(self) -> Array:
@@ -415,12 +431,3 @@ class Measurement:
             lost = self.missing[:, k]
             filled[lost, k] = np.interp(rows[lost], rows[~lost], filled[~lost, k])
         return filled
-
-
-def _differences(s: Signals) -> Array:
-    """Central differences of the positions; zero where a row is alone."""
-    rates = np.zeros_like(s.q)
-    for rows in s.segments:
-        if rows.stop - rows.start > 1:
-            rates[rows] = np.gradient(s.q[rows], s.clock[rows], axis=0)
-    return rates

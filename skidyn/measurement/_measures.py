@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from skidyn._signals import runs_of
+
 #: Least step of a coarse position, rad: a turn in 13 bits.
 COARSE = 0.9 * 2 * np.pi / 2**13
 #: Samples between positions whose differences show reversals.
@@ -77,6 +79,8 @@ def is_repeated(position: np.ndarray, velocity: np.ndarray, trajectory: np.ndarr
     """Rows in which no position changes although some joint moves, as a mask."""
     again = np.zeros(len(position), dtype=bool)
     same = np.all(position[1:] == position[:-1], axis=1) & (trajectory[1:] == trajectory[:-1])
+    if not same.any():
+        return again
     # a velocity that never changes was not measured
     fast = np.where(np.ptp(velocity, axis=0) > 0, 0.02 * np.abs(velocity).max(axis=0), np.inf)
     moving = np.any(np.abs(velocity[1:]) > fast, axis=1)
@@ -221,12 +225,6 @@ def idle_rows(
             if moved or not torque[same].any():
                 idle[same] = True
     return idle
-
-
-def runs_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First rows of the runs of true rows in a mask, and the rows after their last ones."""
-    edges = np.flatnonzero(np.diff(np.r_[0, mask.astype(int), 0]))
-    return edges[::2], edges[1::2]
 
 
 def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import SAMPLES, Fits, Reading, friction
+from skidyn.measurement._fits import Fits, friction
 from skidyn.measurement._loads import LOAD, by_recording, n_loads
-from skidyn.measurement._robust import FREEDOM, student
+from skidyn.measurement._reading import Reading
+from skidyn.measurement._robust import student, student_weights
 from skidyn.robots import Robot
 
 #: Shares of a body's mass, times its length and its square for first and second moments, to which a
@@ -83,16 +84,16 @@ class NearBodies:
         robot = fits.robot
         if reading.gravity is not None:
             robot = replace(robot, gravity=np.asarray(reading.gravity))
-        self.fits, self.signals = fits, fits.motion(reading).with_(robot=robot)
+        self.fits, self.signals = fits, reading.motion(fits.signals).with_(robot=robot)
         self.gains = gains
         stated = np.asarray(robot.inertial_parameters, dtype=float).ravel()
         every = np.arange(stated.size)
         regressor = fits.mean_regressor(robot, self.signals, every)
         size = sizes(robot)
-        read = [fits.torque_column(reading, j) for j in range(fits.n_joints)]
+        read = [reading.torque_column(j) for j in range(fits.n_joints)]
         self.joints = [j for j, (column, _) in enumerate(read) if fits.usable(column)]
         self.inflation = [float(inflation[read[j][0]]) for j in self.joints]
-        number = self.signals.trajectory[::SAMPLES] if fits.loads else np.zeros(fits.n_rows, int)
+        number = fits.recording if fits.loads else 0 * fits.recording
         self.n_loads = n_loads(number)
         self.n_bodies, self.size = stated.size, stated.size + 4 * len(self.joints) + self.n_loads
         self.rows: list[NDArray[np.bool_]] = []
@@ -165,10 +166,7 @@ class NearBodies:
                 float(np.sqrt(np.mean(w * r**2))) + 1e-12
                 for w, r in zip(trust, residuals, strict=True)
             ]
-            trust = [
-                (FREEDOM + 1) / (FREEDOM + (r / s) ** 2)
-                for r, s in zip(residuals, scales, strict=True)
-            ]
+            trust = [student_weights(r, s) for r, s in zip(residuals, scales, strict=True)]
         alike = [
             student(r, s) / i for r, s, i in zip(residuals, scales, self.inflation, strict=True)
         ]

@@ -5,18 +5,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import repeat
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.measurement._bodies import USUAL, Explained, explained
+from skidyn.measurement._bodies import Explained, explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
-from skidyn.measurement._fits import SAMPLES, Fits, Reading
+from skidyn.measurement._fits import Fits
+from skidyn.measurement._gains import USUAL
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd_order import find_exchanges
+from skidyn.measurement._peak import climb
+from skidyn.measurement._reading import Reading
 from skidyn.measurement._robust import robust_likelihood, student
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import asked_gain
@@ -95,7 +98,7 @@ class OddRecording(Check):
         exchanged = list(find_exchanges(seen))
         for pair in exchanged:
             measurement.odd = True
-            names = " and ".join(measurement.joint(k) for k in pair.joints)
+            names = measurement.joints(pair.joints)
             yield self.suspicion(
                 f"in trajectory {pair.run} the torques of {names} are exchanged",
                 "each is what the other trajectories predict for the other joint, which improves "
@@ -122,7 +125,7 @@ class OddRecording(Check):
                     scaled.append(one)
                 elif one.gain > least and one.larger > LARGER and one.likeness < UNLIKE:
                     # a contact, or a payload of one recording, would look like it
-                    without, left, _ = left_by_effects(seen.fits, k, _rows_of(seen.fits, one.run))
+                    without, left, _ = left_by_effects(seen.fits, k, seen.fits.recording == one.run)
                     if left > max(LARGER, LEFT * without):
                         unlike.append(one)
         shifted = {}
@@ -154,7 +157,7 @@ class OddRecording(Check):
             )
         for run in sorted({one.run for one in scaled}):
             own = [one for one in scaled if one.run == run]
-            names = ", ".join(measurement.joint(one.joint) for one in own)
+            names = measurement.joints(one.joint for one in own)
             multiples = ", ".join(f"{one.multiple:.3g}" for one in own)
             yield self.suspicion(
                 f"in trajectory {run} the torque of {names} has a different sign or scale than in "
@@ -169,7 +172,7 @@ class OddRecording(Check):
             return  # the rest is due to another friction
         for run in sorted({one.run for one in unlike} - {one.run for one in scaled}):
             own = [one for one in unlike if one.run == run]
-            names = ", ".join(measurement.joint(one.joint) for one in own)
+            names = measurement.joints(one.joint for one in own)
             shares = ", ".join(f"{one.larger:.2g}" for one in own)
             yield self.suspicion(
                 f"in trajectory {run} the torque of {names} is nearly unrelated to the motion",
@@ -203,12 +206,12 @@ def _sizes(measurement: Measurement) -> dict[int, float]:
 
 def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
     """Joint, angle and gain of another zero in a recording, for bodies of the others."""
-    rows = _rows_of(fits, run)
+    rows = fits.recording == run
     if rows.all() or rows.sum() < FEWEST:
         return None
     bodies, scales = fits.only(~rows).bodies()
     own = fits.only(rows)
-    inflation = np.maximum(fits.identified(Reading()).inflation, 1.0)
+    inflation = fits.identified(Reading()).inflation
 
     def likelihood(joint: int, angle: float) -> float:
         left = own.residuals(bodies, Reading(zero=((joint, angle),)))
@@ -221,13 +224,8 @@ def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
     plain = likelihood(0, 0.0)
     best = (0, 0.0, plain)
     for joint in np.flatnonzero(~fits.signals.prismatic).tolist():
-        angle, value, step = 0.0, plain, np.deg2rad(30)
-        while step > np.deg2rad(1):
-            near, other = max((likelihood(joint, a), a) for a in (angle - step, angle + step))
-            if near > value:
-                value, angle = near, other
-            else:
-                step /= 2
+        of_joint = partial(likelihood, joint)
+        angle, value = climb(of_joint, 0.0, np.deg2rad(30), np.deg2rad(1))
         best = max(best, (joint, angle, value), key=lambda found: found[2])
     joint, angle, value = best
     before, after = errors(joint, 0.0), errors(joint, angle)
@@ -251,24 +249,19 @@ def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:
     return (joint, angle, float(gain)) if share < min(LEFT, BETTER * left / without) else None
 
 
-def _rows_of(fits: Fits, run: int) -> NDArray[np.bool_]:
-    """Rows of a recording."""
-    return np.asarray(fits.signals.trajectory[::SAMPLES] == run)
-
-
 def _multiples(seen: Explained) -> list[Multiple]:
     """Multiples of every joint and recording with enough rows."""
     fits, outcome = seen.fits, seen.identified
     # one of few recordings distorts the bodies identified from all of them
     apart = bool(np.any(seen.errors[1] > SPOILED))
     told = []
-    runs = np.unique(fits.signals.trajectory)
-    parts = [_rows_of(fits, run) for run in runs]
+    runs = np.unique(fits.recording)
+    parts = [fits.recording == run for run in runs]
     elsewhere = fits.predicted_without(parts) if apart else repeat({})
     for run, rows, others in zip(runs, parts, elsewhere, strict=False):
         for k in seen.joints:
-            use = fits.moving[:, k]
-            y = fits.average(fits.torque[:, k])[use]
+            y, use = fits.mean_torque(k)
+            y = y[use]
             own, scale = rows[use], float(outcome.scale[k])
             predicted = (y - outcome.residual[k])[own]
             if k in others:
@@ -281,7 +274,7 @@ def _multiples(seen: Explained) -> list[Multiple]:
             found = _multiple(y[own], predicted, scale) if own.sum() >= FEWEST else None
             if found is not None:
                 size, likeness, gain, larger = found
-                gain /= max(1.0, outcome.inflation_of(k))
+                gain /= outcome.inflation_of(k)
                 told.append(Multiple(k, int(run), size, likeness, gain, larger, bool(spoils)))
     return told
 

@@ -40,7 +40,7 @@ class OddMotion(Check):
         if measurement.clock != 1:
             return  # what is short or a gap is another in the wrong unit
         for run, slopes in measurement.odd_motion.items():
-            names = ", ".join(measurement.joint(k) for k in slopes)
+            names = measurement.joints(slopes)
             sizes = np.array(list(slopes.values()))
             known = np.isfinite(sizes)
             told = ", ".join(f"{size:.4g}" for size in sizes[known])

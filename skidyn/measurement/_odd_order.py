@@ -11,7 +11,6 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn.measurement._bodies import Explained
-from skidyn.measurement._fits import SAMPLES
 from skidyn.measurement._robust import student
 
 #: Fewest rows of a recording in which both joints move.
@@ -43,7 +42,7 @@ def find_exchanges(seen: Explained) -> Iterator[Exchange]:
     fits, outcome = seen.fits, seen.identified
     if len(seen.joints) < 2 or not np.any(seen.errors[1] > WORTH):
         return
-    number = fits.signals.trajectory[::SAMPLES]
+    number = fits.recording
     runs = np.unique(number)
     if len(runs) < 3:
         return
@@ -61,7 +60,7 @@ def find_exchanges(seen: Explained) -> Iterator[Exchange]:
             p = predicted[both][:, list(pair)]
             y = np.stack([fits.mean_torque(k)[0][both] for k in pair], axis=1)
             scales = np.array([others[k][1] for k in pair])
-            inflation = np.array([max(outcome.inflation_of(k), 1.0) for k in pair])
+            inflation = np.array([outcome.inflation_of(k) for k in pair])
             gain = _gain(y[:, ::-1] - p, y - p, scales, inflation)
             plain, exchanged = (np.sqrt(np.mean((x - p) ** 2, axis=0)) for x in (y, y[:, ::-1]))
             alike = exchanged < np.minimum(LEFT * plain, SPREAD * np.std(y[:, ::-1], axis=0))

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from skidyn._text import joints_told, listed
+from skidyn.measurement._suspicion import remedy_of
+
 #: Quantities of a measurement, and their plurals.
 CHANNELS = {"q": "positions", "dq": "velocities", "tau": "torques"}
 
@@ -30,25 +33,7 @@ def placeholder_remedy(
         for quantity in CHANNELS:
             joints = [k for own, k in channels if own == quantity]
             names += [quantity] if len(joints) == n else [f"{quantity}{k + 1}" for k in joints]
-    option = ",".join(f"{name}={exactly(value)}" for name in names)
-    return f"--placeholder {option}", f"placeholder={dict.fromkeys(names, value)}"
-
-
-def exactly(value: float) -> str:
-    """A number as short as possible, but with all digits.
-
-    Parameters
-    ----------
-    value : float
-        A number.
-
-    Examples
-    --------
-    >>> exactly(-1.0), exactly(65535.0), exactly(174.51514)
-    ('-1', '65535', '174.51514')
-    """
-    short = f"{value:g}"
-    return short if float(short) == value else repr(value).removesuffix(".0")
+    return remedy_of("placeholder", dict.fromkeys(names, value))
 
 
 def in_words(channels: Sequence[tuple[str, int]], n: int) -> str:
@@ -72,7 +57,6 @@ def in_words(channels: Sequence[tuple[str, int]], n: int) -> str:
             alike.setdefault(joints, []).append(name)
     told = []
     for joints, names in alike.items():
-        numbers = ", ".join(str(k + 1) for k in joints)
-        owner = f"joint{'s' if len(joints) > 1 else ''} {numbers}"
-        told.append(f"{', '.join(names)} of {'all joints' if len(joints) == n > 1 else owner}")
-    return " and ".join(told)
+        owner = "all joints" if len(joints) == n > 1 else joints_told(k + 1 for k in joints)
+        told.append(f"{listed(names)} of {owner}")
+    return listed(told)

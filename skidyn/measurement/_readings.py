@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Readings of a log that differ from the user's in one respect, and search for the best."""
+"""Search for the reading of a log that explains the torque best."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
-from skidyn._signals import Array
-from skidyn.measurement._duel import fight
-from skidyn.measurement._fits import Fits, Outcome, Reading, friction
-from skidyn.measurement._peak import peak
-from skidyn.robots import Robot
+from skidyn.measurement._changes import Change, alternatives, fitted_gravity, is_upright
+from skidyn.measurement._duel import Duel, fight
+from skidyn.measurement._fits import Fits
+from skidyn.measurement._outcome import Outcome
+from skidyn.measurement._peak import climb, peak
+from skidyn.measurement._reading import Reading
 
 #: Least log-likelihood gain of a change, corrected for the correlation of neighbouring rows.
 LEAST = 15.0
@@ -43,16 +43,6 @@ BESIDE = 0.3
 LEFT_OVER = 0.4
 #: Least share of a joint's spread that the new reading must remove.
 LEAST_DROP = 0.15
-#: Strength of gravity, and the largest tilt of a table, degrees.
-GRAVITY, LEAST_ANGLE = 9.81, 20.0
-#: Cosine of the angle to an axis from which gravity is along that axis.
-UPRIGHT = 0.995
-#: Cosine of the angle between the axes of two joints from which their angles add up.
-PARALLEL = 0.999
-#: Offsets of a position that are tried, rad.
-OFFSETS = np.deg2rad([-135, -90, -45, -15, 15, 45, 90, 135, 180])
-#: Those tried for a joint that also counts in the opposite direction, rad.
-QUARTERS = np.deg2rad([-90, 90, 180])
 #: Distance of the angles of a parabola through the likelihood of a zero, rad, and how often several
 #: zeros are refined in turn.
 NEAR, SWEEPS = np.deg2rad(1.0), 3
@@ -62,51 +52,6 @@ OTHER_BODIES = "bodies that differ from the description"
 SCREENED, FINALISTS = 1, 12
 #: Angles of every joint that are tried beside loads.
 ANGLES = 3
-#: Rows of these fits at least, and at most over the number of joints.
-FEWEST_ROWS, MOST_ROWS = 150, 2800
-
-
-@dataclass(frozen=True)
-class Change:
-    """One difference of a reading from that of the user.
-
-    Attributes
-    ----------
-    kind : str
-        ``"torque_sign"``, ``"motion_sign"``, ``"joint_sign"`` (both), ``"order"``,
-        ``"motion_order"``, ``"torque_order"``, ``"summed"``, ``"gravity"``, ``"no_gravity"`` or
-        ``"zero"``; during the comparison also ``"convention"``, a joint sign with a zero.
-    joints : tuple of int
-        Joints concerned, from 0.
-    reading : Reading
-        With this change and those found before it.
-    gain, confirmed : float
-        Log-likelihood gain with the bodies of the description, and with identified ones.
-    untuned : float
-        Its gain in few rows; of a zero, at the best of the angles tried for all joints.
-    drop : float
-        Share of the residual's spread that it removes, on the joint that gains most.
-    rivals : tuple of str
-        Other kinds of change of the same joints that explain equally much.
-    other : str
-        An equally good explanation other than a reading, such as a physical effect; empty if none.
-    rival_gains : bool
-        Whether that other explanation is the likelier one.
-    restorable : bool
-        For torque without gravity: whether it was subtracted with the bodies of the description.
-    """
-
-    kind: str
-    joints: tuple[int, ...]
-    reading: Reading
-    gain: float = 0.0
-    confirmed: float = 0.0
-    untuned: float = 0.0
-    drop: float = 0.0
-    rivals: tuple[str, ...] = ()
-    other: str = ""
-    rival_gains: bool = False
-    restorable: bool = False
 
 
 def find_changes(fits: Fits) -> list[Change]:
@@ -148,8 +93,8 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
 
     Few rounds select the alternatives to be examined in detail.
     """
-    here, few = fits.nominal(reading), fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
-    screened = _screened(few, reading, _alternatives(fits, reading, here))
+    here, few = fits.nominal(reading), fits.few
+    screened = _screened(few, reading, alternatives(fits, reading, here))
     judged = []
     for rough_gain, change in _distinct(screened)[:FINALISTS]:
         if rough_gain > 0:
@@ -182,6 +127,11 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         restored_change = _restored(fits, reading, here)
         if restored_change is not None:
             return restored_change
+
+    @cache
+    def fought(other: Reading, joints: tuple[int, ...]) -> Duel:
+        return fight(fits, reading, other, joints)
+
     accepted = []
     for change in judged:
         if change.kind == "no_gravity":
@@ -205,7 +155,8 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
     while accepted:
         best = _turned(fits, _first(accepted), accepted)
-        held = _against_effects(fits, reading, here, best)
+        most = int(np.argmax(fits.nominal(best.reading).margin(here)))
+        held = _against_effects(fought(best.reading, best.joints or (most,)), best)
         if held is not None:
             return held
         accepted.remove(best)
@@ -215,7 +166,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
     for change in turned:
         angle = abs(change.reading.zero[-1][1])
         if change.drop >= MOSTLY and angle >= NOTED:
-            return _or_bodies(fits, reading, change)
+            return _or_bodies(fought(change.reading, change.joints), change)
     return None
 
 
@@ -314,7 +265,7 @@ def _turned(fits: Fits, first: Change, accepted: list[Change]) -> Change:
 def _free_angles(change: Change) -> int:
     """Number of angles of a change that were fitted."""
     if change.kind == "gravity":
-        return 0 if _upright(change.reading.gravity) else 2
+        return 0 if is_upright(change.reading.gravity) else 2
     return int(change.kind == "zero")
 
 
@@ -325,23 +276,11 @@ def _but_for_angle(change: Change, zero: Change) -> bool:
     """
     if zero.kind != "zero" or change.kind != "gravity":
         return False
-    return _upright(change.reading.gravity) and change.untuned > zero.untuned - TIED
+    return is_upright(change.reading.gravity) and change.untuned > zero.untuned - TIED
 
 
-def is_oblique(gravity: Sequence[float] | None) -> bool:
-    """Whether there is gravity, but not along an axis of the base."""
-    return gravity is not None and bool(np.any(gravity)) and not _upright(gravity)
-
-
-def _upright(gravity: Sequence[float] | None) -> bool:
-    """Whether gravity is along an axis of the base."""
-    return gravity is not None and float(np.max(np.abs(gravity))) > UPRIGHT * GRAVITY
-
-
-def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change) -> Change | None:
+def _against_effects(duel: Duel, change: Change) -> Change | None:
     """The change with its alternatives; None if an effect, or other bodies, explain it."""
-    most = int(np.argmax(fits.nominal(change.reading).margin(here)))
-    duel = fight(fits, reading, change.reading, change.joints or (most,))
     if min(duel.gain, duel.beside) >= LEAST and duel.beside >= BESIDE * duel.gain:
         return change
     if duel.gain < LEAST and duel.rival < LEAST and duel.gain > 0:
@@ -351,12 +290,11 @@ def _against_effects(fits: Fits, reading: Reading, here: Outcome, change: Change
     return replace(change, other=duel.effect)
 
 
-def _or_bodies(fits: Fits, reading: Reading, zero: Change) -> Change | None:
+def _or_bodies(duel: Duel, zero: Change) -> Change | None:
     """A zero that explains nearly all, beside other bodies or a load, which do so as well.
 
     They turn the direction of the weight on a last joint as another zero does.
     """
-    duel = fight(fits, reading, zero.reading, zero.joints)
     other = duel.effect or OTHER_BODIES
     return replace(zero, other=other, rival_gains=True) if duel.gain > 0 else None
 
@@ -364,13 +302,18 @@ def _or_bodies(fits: Fits, reading: Reading, zero: Change) -> Change | None:
 def _refined(fits: Fits, change: Change) -> Change:
     """The zero of a position at which the robot explains the torque best, near one that was tried.
 
-    By halving steps, since the likelihood has one maximum within half a step.
+    The likelihood has one maximum within half the distance of those that are tried.
     """
+    *others, (joint, angle) = change.reading.zero
 
-    def likelihood(reading: Reading) -> float:
-        return float(fits.nominal(reading, SCREENED).likelihood.sum())
+    def read(angle: float) -> Reading:
+        return replace(change.reading, zero=(*others, (joint, float(angle))))
 
-    return _climbed(change, likelihood, 22.5)
+    def likelihood(angle: float) -> float:
+        return float(fits.nominal(read(angle), SCREENED).likelihood.sum())
+
+    angle, _ = climb(likelihood, angle, np.deg2rad(22.5), np.deg2rad(0.25))
+    return replace(change, reading=read(angle))
 
 
 def _sharpened(fits: Fits, reading: Reading, joints: Sequence[int]) -> Reading:
@@ -402,24 +345,6 @@ def _with_zero(reading: Reading, joint: int, angle: float) -> Reading:
     return replace(reading, zero=zero)
 
 
-def _climbed(change: Change, likelihood: Callable[[Reading], float], degrees: float) -> Change:
-    """Angle of the last zero at the maximum of a likelihood, by halving steps."""
-    *others, (joint, angle) = change.reading.zero
-
-    def reading(angle: float) -> Reading:
-        return replace(change.reading, zero=(*others, (joint, float(angle))))
-
-    best, step = likelihood(reading(angle)), np.deg2rad(degrees)
-    while step > np.deg2rad(0.25):
-        for other in (angle - step, angle + step):
-            if (value := likelihood(reading(other))) > best:
-                angle, best = other, value
-                break
-        else:
-            step /= 2
-    return replace(change, reading=reading(angle))
-
-
 #: Share of a zero's gain that identified bodies may still gain over it on its joint.
 UNEXPLAINED = 0.1
 
@@ -430,7 +355,7 @@ def _is_all(fits: Fits, change: Change, identified: Outcome) -> bool:
     Bodies that are not those stated look like another zero of their joint, but leave more.
     """
     (joint,) = change.joints
-    column, _ = fits.torque_column(change.reading, joint)
+    column, _ = change.reading.torque_column(joint)
     left = float(identified.margin(fits.nominal(change.reading))[column])
     return left <= UNEXPLAINED * change.gain
 
@@ -450,7 +375,7 @@ def _all_gain(fits: Fits, change: Change, reading: Reading, here: Outcome) -> bo
         column
         for j in range(fits.n_joints)
         if _columns(fits, change.reading, j) != _columns(fits, reading, j)
-        and fits.usable(column := fits.torque_column(change.reading, j)[0])
+        and fits.usable(column := change.reading.torque_column(j)[0])
     ]
     gains = there.margin(here)[moved]
     return bool(gains.sum() >= LEAST and np.all(gains > -LEAST))
@@ -459,109 +384,12 @@ def _all_gain(fits: Fits, change: Change, reading: Reading, here: Outcome) -> bo
 def _columns(fits: Fits, reading: Reading, joint: int) -> tuple[int, int]:
     """Columns of the motion and of the torque of a joint."""
     motion = joint if reading.order is None else reading.order[joint]
-    return motion, fits.torque_column(reading, joint)[0]
+    return motion, reading.torque_column(joint)[0]
 
 
 def _drop(before: Outcome, after: Outcome) -> float:
     shares = 1 - after.scale / before.scale
     return float(shares[int(np.argmax(after.margin(before)))])
-
-
-def _alternatives(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Change]:
-    """Readings that differ from one in a single respect."""
-    joints = range(fits.n_joints)
-    for j in joints:
-        own = frozenset([j])
-        flip_torque, flip_motion = reading.flip_torque ^ own, reading.flip_motion ^ own
-        yield Change("torque_sign", (j,), replace(reading, flip_torque=flip_torque))
-        yield Change("motion_sign", (j,), replace(reading, flip_motion=flip_motion))
-        both = replace(reading, flip_torque=flip_torque, flip_motion=flip_motion)
-        yield Change("joint_sign", (j,), both)
-    # single ones would contradict each other; all of them are another convention
-    every = replace(reading, flip_torque=frozenset(joints) ^ reading.flip_torque)
-    yield Change("torque_sign", tuple(joints), every)
-    yield from _orders(fits, reading)
-    told = {joint for joint, _ in reading.summed}
-    for j, sign in _parallel(fits.robot):
-        if j not in told:
-            summed = replace(reading, summed=(*reading.summed, (j, sign)))
-            yield Change("summed", (j,), summed)
-    if reading.gravity is None:
-        yield from _gravities(fits, reading, here)
-    found = {joint for joint, _ in reading.zero}
-    for j in np.flatnonzero(~fits.signals.prismatic).tolist():
-        for offset in OFFSETS:
-            if j not in found:
-                shifted = replace(reading, zero=(*reading.zero, (j, float(offset))))
-                yield Change("zero", (j,), shifted)
-        for offset in QUARTERS:
-            if j not in found:
-                both = replace(
-                    reading,
-                    flip_torque=reading.flip_torque ^ {j},
-                    flip_motion=reading.flip_motion ^ {j},
-                    zero=(*reading.zero, (j, float(offset))),
-                )
-                yield Change("convention", (j,), both)
-
-
-def _parallel(robot: Robot) -> Iterator[tuple[int, int]]:
-    """Revolute joints with an axis parallel to the previous one, and its relative direction."""
-    tree, turning = robot.tree, [kind == "revolute" for kind in robot.joint_types]
-    if len(tree.parents) != robot.n_joints:
-        return  # bodies that mimic others have no columns of their own
-    for j in range(1, robot.n_joints):
-        if turning[j] and turning[j - 1] and tree.parents[j] == j - 1:
-            along = float(tree.axes[j - 1] @ tree.rotations[j] @ tree.axes[j])
-            if abs(along) > PARALLEL:
-                yield j, 1 if along > 0 else -1
-
-
-def _orders(fits: Fits, reading: Reading) -> Iterator[Change]:
-    """Orders of the columns: two exchanged, by name, backwards, one further."""
-    n = fits.n_joints
-    for name in ("order", "torque_order"):
-        now = list(getattr(reading, name) or range(n))
-        tried = []
-        for a, b in combinations(range(n), 2):
-            swapped = list(now)
-            swapped[a], swapped[b] = swapped[b], swapped[a]
-            tried.append(swapped)
-        if n > 2 and getattr(reading, name) is None:
-            by_name = sorted(range(n), key=lambda j: fits.robot.joint_names[j])
-            tried += [[by_name.index(j) for j in range(n)], list(range(n))[::-1]]
-            tried += [list(np.roll(range(n), k)) for k in (1, -1)]  # a column was lost or added
-        for order in tried:
-            wanted = None if order == list(range(n)) else tuple(map(int, order))
-            moved = tuple(j for j in range(n) if order[j] != j)
-            if wanted is not None:
-                changed: Any = {name: wanted}
-                yield Change(name, moved, replace(reading, **changed))
-            if name == "order" and wanted is not None:  # the same motion, with the torques as now
-                own = tuple(order.index(fits.torque_column(reading, j)[0]) for j in range(n))
-                yield Change(
-                    "motion_order", moved, replace(reading, order=wanted, torque_order=own)
-                )
-
-
-def _gravities(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Change]:
-    """Other directions of gravity, the one that fits best among them, and none."""
-    own = np.asarray(fits.robot.gravity, dtype=float)
-    known = bool(np.linalg.norm(own))
-    if known:
-        # first, so that it has priority over a direction of gravity without torque
-        yield Change("no_gravity", (), replace(reading, gravity=(0.0, 0.0, 0.0)))
-    directions = [sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
-    best = fitted_gravity(fits, reading, here)
-    if best is not None and np.linalg.norm(best) > 0:
-        best = best / np.linalg.norm(best)
-        if float(np.max(np.abs(best))) < UPRIGHT:
-            directions.append(best)
-    for direction in directions:
-        cosine = float(direction @ own / np.linalg.norm(own)) if known else 0.0
-        if np.rad2deg(np.arccos(np.clip(cosine, -1, 1))) >= LEAST_ANGLE:
-            x, y, z = (float(v) for v in GRAVITY * direction)
-            yield Change("gravity", (), replace(reading, gravity=(x, y, z)))
 
 
 def _without_gravity(fits: Fits, reading: Reading, here: Outcome) -> bool:
@@ -599,33 +427,3 @@ def _restored_gain(fits: Fits, without: Reading, reading: Reading) -> tuple[floa
     restored = float(whole.margin(absent).sum())
     held = (whole if restored > 0 else absent).margin(present)
     return restored, float(held.sum())
-
-
-def fitted_gravity(fits: Fits, reading: Reading, here: Outcome) -> Array | None:
-    """Gravity that explains the torque best with the bodies of the description, m/s^2."""
-    s = fits.motion(reading)
-    still, pulls = fits.gravity_parts(reading)
-    blocks, targets = [], []
-    for j in range(fits.n_joints):
-        column, sign = fits.torque_column(reading, j)
-        use = fits.moving[:, column]
-        if not fits.usable(column):
-            continue
-        y = sign * fits.average(fits.torque[:, column])[use] - still[use, j]
-        own = np.column_stack([fits.average(friction(s, j))[use], np.ones(int(use.sum()))])
-        basis, _ = np.linalg.qr(own)
-        pull = pulls[:, use, j].T
-        blocks.append((pull - basis @ (basis.T @ pull)) / here.scale[column])
-        targets.append((y - basis @ (basis.T @ y)) / here.scale[column])
-    if not blocks:
-        return None
-    a, y = np.vstack(blocks), np.concatenate(targets)
-    weight = np.ones(len(y))
-    gravity = np.zeros(3)
-    for _ in range(5):
-        scaled = a * np.sqrt(weight)[:, None]
-        gravity = np.linalg.lstsq(scaled, y * np.sqrt(weight), rcond=1e-6)[0]
-        r = y - a @ gravity
-        spread = 1.4826 * float(np.median(np.abs(r))) + 1e-12
-        weight = 1 / np.maximum(1.0, np.abs(r) / (1.5 * spread))
-    return np.asarray(gravity)

@@ -19,10 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from skidyn._signals import Array
+from skidyn._signals import Array, scatter
 
 #: Degrees of freedom of the residuals, and rounds of the fit.
 FREEDOM, ROUNDS = 4.0, 5
+#: Logarithm of their density at zero, with a scale of one.
+DENSITY = lgamma((FREEDOM + 1) / 2) - lgamma(FREEDOM / 2) - np.log(FREEDOM * np.pi) / 2
 #: Largest correlation of neighbouring rows: the residual of slightly wrong bodies is correlated
 #: over seconds, and would make any log too short.
 MOST_ALIKE = 0.875
@@ -62,7 +64,7 @@ def fit_admissible(columns: Array, y: Array, rounds: int = ROUNDS) -> RobustFit:
         coefficients = _not_negative(gram[None], (weighted.T @ z)[None])[0]
         residual = z - b @ coefficients
         scale = float(np.sqrt(np.mean(weight * residual**2))) + 1e-12
-        weight = (FREEDOM + 1) / (FREEDOM + (residual / scale) ** 2)
+        weight = student_weights(residual, scale)
     return RobustFit(coefficients / size, scale, residual, student(residual, scale))
 
 
@@ -90,9 +92,10 @@ def fit_at_once(columns: Array, y: Array, use: NDArray[np.bool_]) -> list[Robust
     coefficients = _not_negative(gram, np.matmul(b, z[:, :, None])[:, :, 0])
     residual = z - np.matmul(coefficients[:, None], b)[:, 0]
     scale = np.sqrt(np.sum(residual**2, axis=1) / total) + 1e-12
+    parts = [r[w] for r, w in zip(residual, use, strict=True)]
     return [
-        RobustFit(c, float(s), r[w], student(r[w], float(s)))
-        for c, s, r, w in zip(coefficients / size, scale, residual, use, strict=True)
+        RobustFit(c, s, r, student(r, s))
+        for c, s, r in zip(coefficients / size, scale.tolist(), parts, strict=True)
     ]
 
 
@@ -175,32 +178,48 @@ def fit_together(
             float(np.sqrt(np.mean(w * r**2))) + 1e-12
             for w, r in zip(weights, residuals, strict=True)
         ]
-        weights = [
-            (FREEDOM + 1) / (FREEDOM + (r / s) ** 2) for r, s in zip(residuals, scales, strict=True)
-        ]
+        weights = [student_weights(r, s) for r, s in zip(residuals, scales, strict=True)]
     return [
         RobustFit(coefficients[place] / size[place], s, r, student(r, s))
         for place, r, s in zip(places, residuals, scales, strict=True)
     ]
 
 
+def student_weights(residual: Array, scale: float) -> Array:
+    """Weights of residuals under Student's t, close to one for those within their scale."""
+    return (FREEDOM + 1) / (FREEDOM + (residual / scale) ** 2)
+
+
 def student(residual: Array, scale: float) -> float:
     """Log-likelihood of residuals under Student's t."""
-    constant = lgamma((FREEDOM + 1) / 2) - lgamma(FREEDOM / 2) - np.log(FREEDOM * np.pi) / 2
     spread = np.log1p((residual / scale) ** 2 / FREEDOM)
-    return float(len(residual) * (constant - np.log(scale)) - (FREEDOM + 1) / 2 * spread.sum())
+    return float(len(residual) * (DENSITY - np.log(scale)) - (FREEDOM + 1) / 2 * spread.sum())
+
+
+def gains_of(before: Sequence[RobustFit], after: Sequence[RobustFit]) -> list[float]:
+    """Log-likelihood that fits of the same rows gain over others, by joint.
+
+    Parameters
+    ----------
+    before, after : sequence of RobustFit
+        Fits of the same joints.
+    """
+    return [
+        (there.likelihood - here.likelihood) / there.inflation
+        for here, there in zip(before, after, strict=True)
+    ]
 
 
 def robust_weights(fit: RobustFit) -> Array:
     """Weight of every row of a robust fit, over the square of its scale."""
-    return (FREEDOM + 1) / (FREEDOM + (fit.residual / fit.scale) ** 2) / fit.scale**2
+    return student_weights(fit.residual, fit.scale) / fit.scale**2
 
 
 def robust_likelihood(residual: Array) -> float:
     """Log-likelihood of residuals at approximately the best scale."""
     scale = float(np.std(residual)) + 1e-12
     for _ in range(ROUNDS):
-        weight = (FREEDOM + 1) / (FREEDOM + (residual / scale) ** 2)
+        weight = student_weights(residual, scale)
         scale = float(np.sqrt(np.mean(weight * residual**2))) + 1e-12
     return student(residual, scale)
 
@@ -210,7 +229,7 @@ def _inflation(residual: Array) -> float:
     if len(residual) < FEWEST:
         return 1.0
     r = residual - np.median(residual)
-    r = np.clip(r, *(np.array([-3, 3]) * (1.4826 * np.median(np.abs(r)) + 1e-300)))
+    r = np.clip(r, *(np.array([-3, 3]) * (scatter(r) + 1e-300)))
     alike = float(r[1:] @ r[:-1] / (r @ r)) if r @ r > 0 else 0.0
     alike = float(np.clip(alike, 0.0, MOST_ALIKE))
     return (1 + alike) / (1 - alike)

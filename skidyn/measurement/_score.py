@@ -36,7 +36,7 @@ class Score:
     def __init__(self, fits: Fits) -> None:
         self.fits, self.together = fits, JointFit(fits, range(fits.n_joints))
         self.plain = self.together.fit(fits.torque)
-        self.inflation = [max(fit.inflation, 1.0) for fit in self.plain]
+        self.inflation = [fit.inflation for fit in self.plain]
         self.weights = [
             robust_weights(fit) / i for fit, i in zip(self.plain, self.inflation, strict=True)
         ]

@@ -28,9 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.measurement._fits import SAMPLES, Fits, Reading
+from skidyn.measurement._fits import SAMPLES, Fits
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._robust import FREEDOM, ROUNDS
+from skidyn.measurement._reading import Reading
+from skidyn.measurement._robust import ROUNDS, student_weights
 from skidyn.measurement._torque import readable_fits
 
 #: Share of rows that are certainly below a limit at first, and share of a limit that is later.
@@ -143,7 +144,6 @@ def _seen(fits: Fits, j: int) -> Servo:
     if is_limited:
         low = use & (most < below)
         half = _half(
-            own,
             hit,
             lambda kept: _Error(needed_of(low & kept), torque, speed, use & kept).least(own),
         )
@@ -153,9 +153,7 @@ def _seen(fits: Fits, j: int) -> Servo:
     return Servo(own, half, int(at.sum()), left, 1 - total, is_limited, *gain)
 
 
-def _half(
-    limit: Array, hit: NDArray[np.bool_], again: Callable[[NDArray[np.bool_]], Array]
-) -> Array:
+def _half(hit: NDArray[np.bool_], again: Callable[[NDArray[np.bool_]], Array]) -> Array:
     """Half the widths of 95 % intervals of a limit, from blocks of rows that are left out in turn.
 
     Each block has its part of the rows at the limit, which are few, and of the others.
@@ -274,5 +272,5 @@ def _multiple(columns: Array, torque: Array) -> tuple[float, float]:
         x = np.linalg.lstsq(columns * root[:, None], torque * root, rcond=1e-9)[0]
         residual = torque - columns @ x
         scale = np.sqrt(np.mean(weight * residual**2)) + 1e-300
-        weight = (FREEDOM + 1) / (FREEDOM + (residual / scale) ** 2)
+        weight = student_weights(residual, float(scale))
     return float(x[0]), float(scale**2 / max(np.var(torque), 1e-300))

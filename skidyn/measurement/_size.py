@@ -12,10 +12,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._lengths import stretched
 from skidyn.measurement._peak import peak
-from skidyn.measurement._readings import FEWEST_ROWS, MOST_ROWS
+from skidyn.measurement._reading import Reading
 
 #: Logarithms of the sizes that are tried, and distance of the points of a parabola.
 TRIED, NEAR = np.linspace(-0.5, 0.5, 21), 0.01
@@ -37,7 +37,7 @@ def find_size(fits: Fits, factors: Mapping[int, float]) -> tuple[float, float] |
         Factors of torques, by joint from 0.
     """
     bodies = np.flatnonzero(fits.robot.tree.parents >= 0).tolist()
-    few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints))
+    few = fits.few
 
     def sized(rows: Fits, log: float) -> Fits:
         return rows.of(stretched(rows.robot, bodies, np.full(len(bodies), log)))
@@ -53,7 +53,7 @@ def find_size(fits: Fits, factors: Mapping[int, float]) -> tuple[float, float] |
     change = there.margin(scaled.identified(Reading()))
     for k, factor in factors.items():  # the density of a torque is that of the scaled one, times it
         rows = float(fits.moving[:, k].sum())
-        change[k] -= rows * np.log(factor) / max(there.inflation_of(k), 1.0)
+        change[k] -= rows * np.log(factor) / there.inflation_of(k)
     if min(gain, float(change.sum())) < LEAST:
         return None
     return float(np.exp(log)), gain

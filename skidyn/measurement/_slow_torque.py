@@ -99,10 +99,10 @@ def _common_period(
             continue
         counts = np.array([n for _, n, _ in sizes])
         gains = sum(gain for _, _, gain in sizes) - 0.5 * np.log(counts.sum()) * (period - 1)
-        logs = np.average([logs for logs, _, _ in sizes], axis=0, weights=counts)
-        times = np.exp(np.ptp(logs, axis=0))
         total = float(np.maximum(gains, 0.0).sum())
         if total > max(1.1 * most, most + 5.0):  # multiples of it gain as much
+            logs = np.average([_from_largest(x) for x, _, _ in sizes], axis=0, weights=counts)
+            times = np.exp(np.ptp(logs, axis=0))
             alike = zip(joints.tolist(), gains.tolist(), times.tolist(), strict=True)
             most, found = total, (period, {k: (g, x) for k, g, x in alike if g > 0})
     return found
@@ -116,7 +116,7 @@ def _is_even(clock: Array) -> bool:
 
 
 def _sizes(logs: Array, square: Array, period: int) -> tuple[Array, int, Array]:
-    """Mean logarithms by phase from the largest on, their number, and what phases gain.
+    """Mean logarithms by phase, their number, and what phases gain.
 
     Parameters
     ----------
@@ -132,8 +132,14 @@ def _sizes(logs: Array, square: Array, period: int) -> tuple[Array, int, Array]:
     total = (square - np.sum(logs[count:] ** 2, axis=0)) / count - means.mean(axis=0) ** 2
     within = total - means.var(axis=0)
     gain = 0.5 * count * np.log(np.maximum(total, 1e-12) / np.maximum(within, 1e-12))
-    # recordings begin at any row of the slower bus, and its values are evenly long
-    phases = (np.argmax(means, axis=0) + np.arange(period)[:, None]) % period
-    means = np.take_along_axis(means, phases, axis=0)
     # one phase and size of every recording that is fitted
     return means, count, gain - 0.5 * (period - 1) * (1 + np.log(period))
+
+
+def _from_largest(means: Array) -> Array:
+    """Means by phase from the largest on, (n_phases, n_joints).
+
+    Recordings begin at any row of the slower bus, and its values are evenly long.
+    """
+    phases = (np.argmax(means, axis=0) + np.arange(len(means))[:, None]) % len(means)
+    return np.take_along_axis(means, phases, axis=0)

@@ -77,6 +77,12 @@ class Turns:
         friction = max(self.step, self.other, float(self.smoothed[0]))
         return float(self.smoothed.max()) - friction
 
+    @property
+    def tells(self) -> bool:
+        """Whether smoothing gains, and at a width that is reported."""
+        reported = WIDTHS[self.width] >= SHORTEST and self.width < len(WIDTHS) - 1
+        return bool(reported) and self.gain > WORD
+
 
 class SmoothedTorque(Check):
     """Torque through a low pass without delay."""
@@ -95,12 +101,18 @@ class SmoothedTorque(Check):
         delay = measured_delay(measurement)
         if delay is not None and delay.common > LATE:
             return  # a filter with delay is reported by another check
-        found = {}
         motion = smoothed(measurement.signals)  # noise would shift reversals
         step = column_step(motion, AROUND, motion.half_width)
         index, few = motion.thinned(step)
         torque = running_mean(measurement.torque, step)[index]
-        for k in np.flatnonzero(measurement.excited).tolist():
+        joints = np.flatnonzero(measurement.excited).tolist()
+        fewest = min(JOINTS, measurement.n_joints)
+        tried = [at_turns(few, torque[:, k], k, others=False) for k in joints]
+        # beside other friction, smoothing gains less
+        if sum(turns is not None and turns.tells for turns in tried) < fewest:
+            return
+        found = {}
+        for k in joints:
             turns = at_turns(few, torque[:, k], k)
             if turns is not None and max(turns.smoothed.max(), turns.other) > turns.step:
                 found[k] = turns
@@ -108,9 +120,9 @@ class SmoothedTorque(Check):
         common = max(set(widths), key=widths.count) if widths else 0
         alike = [k for k, t in found.items() if t.width == common and t.gain > WORD]
         total = sum(turns.gain for turns in found.values() if turns.width == common)
-        if WIDTHS[common] < SHORTEST or common == len(WIDTHS) - 1 or total < LEAST:
+        if total < LEAST or len(alike) < max(fewest, AGREEING * len(found)):
             return
-        if len(alike) < max(min(JOINTS, measurement.n_joints), AGREEING * len(found)):
+        if not found[alike[0]].tells:
             return
         yield self.suspicion(
             f"the torque was smoothed over about {1e3 * 2.5 * WIDTHS[common]:.0f} ms",
@@ -123,7 +135,7 @@ class SmoothedTorque(Check):
         )
 
 
-def at_turns(signals: Signals, torque: Array, joint: int) -> Turns | None:
+def at_turns(signals: Signals, torque: Array, joint: int, *, others: bool = True) -> Turns | None:
     """Fit friction in different forms to the torque around the turns of a joint.
 
     Parameters
@@ -134,6 +146,9 @@ def at_turns(signals: Signals, torque: Array, joint: int) -> Turns | None:
         Recorded torque of the joint.
     joint : int
         Joint, from 0.
+    others : bool, default=True
+        Whether to try friction other than that of a step and smoothed ones; without it, likelihoods
+        are those of independent samples.
 
     Returns
     -------
@@ -166,24 +181,24 @@ def at_turns(signals: Signals, torque: Array, joint: int) -> Turns | None:
     index = np.array([np.arange(part.start, part.stop) for part in places])
     sign = np.sign(dq)
     forms = [sign[index], *(_smoothed(sign, signals, index, width / step) for width in WIDTHS)]
-    dahl = get_effect("dahl")
-    ways = (WAYS * float(signals.unit[joint])).tolist()
-    forms += [dahl.columns(signals, joint, presliding=way)[:, 0][index] for way in ways]
-    speed, side = dq[index], sign[index]
-    for fading in (SPEEDS * float(signals.unit[joint])).tolist():
-        forms.append(np.tanh(speed / fading))
-        near = np.exp(-((speed / fading) ** 2))
-        forms += [side * (1.0 + times * near) for times in TIMES]
+    if others:
+        dahl = get_effect("dahl")
+        ways = (WAYS * float(signals.unit[joint])).tolist()
+        forms += [dahl.columns(signals, joint, presliding=way)[:, 0][index] for way in ways]
+        speed, side = dq[index], sign[index]
+        for fading in (SPEEDS * float(signals.unit[joint])).tolist():
+            forms.append(np.tanh(speed / fading))
+            near = np.exp(-((speed / fading) ** 2))
+            forms += [side * (1.0 + times * near) for times in TIMES]
     slow, _ = np.linalg.qr(np.vander(np.linspace(-1, 1, index.shape[1]), DEGREE + 1))
     left = _without(torque[index], slow)
     fits = [_likelihood(_without(form, slow), left) for form in forms]
     rest = max(fits, key=lambda fit: fit[0])[1]
     # neighbouring samples are alike, in all forms as in the best one
-    alike = float(np.clip(rest[1:] @ rest[:-1] / (rest @ rest + 1e-300), 0.0, 0.95))
+    alike = float(np.clip(rest[1:] @ rest[:-1] / (rest @ rest + 1e-300), 0.0, 0.95)) * others
     values = np.array([value for value, _ in fits]) * (1 - alike) / (1 + alike)
-    return Turns(
-        float(values[0]), values[1 : 1 + len(WIDTHS)], float(values[1 + len(WIDTHS) :].max())
-    )
+    step_value, smooth, other = np.split(values, [1, 1 + len(WIDTHS)])
+    return Turns(float(step_value[0]), smooth, float(other.max(initial=-np.inf)))
 
 
 def _smoothed(values: Array, signals: Signals, index: NDArray[np.int64], width: float) -> Array:

@@ -48,6 +48,54 @@ class Remedy:
         return f"{self.option} (in Python: {self.code})"
 
 
+def remedy_of(argument: str, value: Any) -> tuple[str, str]:
+    """An argument of ``read_log`` as an option of the command line, and in Python.
+
+    Parameters
+    ----------
+    argument : str
+        Its name.
+    value : bool, str, list or dict
+        Its value; numbers keep all their digits.
+
+    Examples
+    --------
+    >>> remedy_of("gain", {"tau1": 0.001, "tau2": 0.5})
+    ('--gain tau1=0.001,tau2=0.5', "gain={'tau1': 0.001, 'tau2': 0.5}")
+    >>> remedy_of("flip", ["q1", "tau1"]), remedy_of("drop_repeated", True)
+    (('--flip q1,tau1', "flip=['q1', 'tau1']"), ('--drop-repeated', 'drop_repeated=True'))
+    """
+    option = f"--{argument.replace('_', '-')}"
+    if value is not True:
+        option += f" {_in_option(value)}"
+    return option, f"{argument}={value!r}"
+
+
+def _in_option(value: Any) -> str:
+    if isinstance(value, dict):
+        return ",".join(f"{name}={_in_option(own)}" for name, own in value.items())
+    if isinstance(value, list):
+        return ",".join(map(_in_option, value))
+    return exactly(value) if isinstance(value, float) else str(value)
+
+
+def exactly(value: float) -> str:
+    """A number as short as possible, but with all digits.
+
+    Parameters
+    ----------
+    value : float
+        A number.
+
+    Examples
+    --------
+    >>> exactly(-1.0), exactly(65535.0), exactly(174.51514)
+    ('-1', '65535', '174.51514')
+    """
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value).removesuffix(".0")
+
+
 @dataclass(frozen=True)
 class Suspicion:
     """One finding of a check of a measurement.

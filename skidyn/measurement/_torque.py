@@ -9,14 +9,17 @@ from dataclasses import replace
 import numpy as np
 
 from skidyn._signals import Array
+from skidyn._text import listed
+from skidyn.measurement._changes import Change, is_oblique
 from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
-from skidyn.measurement._fits import Fits, Reading, friction
+from skidyn.measurement._fits import Fits, friction
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
-from skidyn.measurement._readings import DECISIVE, HALF, Change, find_changes, is_oblique
+from skidyn.measurement._reading import Reading
+from skidyn.measurement._readings import DECISIVE, HALF, find_changes
 from skidyn.measurement._robust import fit_admissible
-from skidyn.measurement._suspicion import Certainty, Suspicion
+from skidyn.measurement._suspicion import Certainty, Suspicion, remedy_of
 
 #: Share of the largest torque below zero that a magnitude may reach, and reversals it must see.
 BELOW, TURNS = 0.01, 4
@@ -24,12 +27,6 @@ BELOW, TURNS = 0.01, 4
 CUT = 0.05
 #: Log-likelihood that the magnitude must gain over the torque itself, and to be sure.
 LEAST, SURE = 15.0, 40.0
-#: Share of a torque's spread that the robot must explain for its multiple to be reported.
-EXPLAINED = 0.5
-#: Multiples of the robot's own torque that may be due to wrong masses.
-USUAL = (0.4, 2.5)
-#: Factors of units of torque.
-UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
 
 
 class UnsignedTorque(Check):
@@ -43,7 +40,7 @@ class UnsignedTorque(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         cut = measurement.clipped
         if cut:
-            names = ", ".join(measurement.joint(k) for k in cut)
+            names = measurement.joints(cut)
             shares = ", ".join(f"{np.mean(measurement.torque[:, k] == 0):.0%}" for k in cut)
             yield self.suspicion(
                 f"the torque of {names} is clipped at zero",
@@ -57,7 +54,7 @@ class UnsignedTorque(Check):
             return
         moving = [k for k, moves in enumerate(measurement.excited) if moves]
         every = len(unsigned) >= 3 and set(moving) <= set(unsigned)
-        names = ", ".join(measurement.joint(k) for k in unsigned)
+        names = measurement.joints(unsigned)
         evidence = (
             f"of {measurement.n_samples} rows none is negative although the joints reverse "
             f"{sum(_turns(measurement, k) for k in unsigned)} times"
@@ -72,7 +69,7 @@ class UnsignedTorque(Check):
             evidence,
             "certain" if every or max(gains.values(), default=0) > SURE else "suspected",
             unsigned,
-            ("--torque-sign command", "torque_sign='command'"),
+            remedy_of("torque_sign", "command"),
         )
 
 
@@ -145,11 +142,10 @@ def _magnitude_gain(fits: Fits, k: int) -> float:
     """Log-likelihood gain of the magnitude of the robot's torque over the torque itself."""
     if not fits.usable(k):
         return 0.0
-    s = fits.motion(Reading())
+    s = Reading().motion(fits.signals)
     own = fits.robot.inverse_dynamics(s.q, s.dq, s.ddq)[:, k]
-    use = fits.moving[:, k]
-    columns = fits.average(np.column_stack([own, friction(s, k)]))[use]
-    y = fits.average(fits.torque[:, k])[use]
+    y, use = fits.mean_torque(k)
+    y, columns = y[use], fits.average(np.column_stack([own, friction(s, k)]))[use]
     # a torque of the opposite sign is one-sided too where gravity is
     plain = max(fit_admissible(columns, sign * y).likelihood for sign in (1.0, -1.0))
     best = -np.inf
@@ -206,7 +202,7 @@ class Columns(Check):
         joints = sorted(set(turned))
         if kind.endswith("_sign"):  # a sign changed twice is unchanged
             joints = [j for j in joints if turned.count(j) % 2]
-        names = ", ".join(measurement.joint(j) for j in joints)
+        names = measurement.joints(joints)
         best = max(changes, key=lambda change: change.gain)
         evidence = (
             "with this correction, the rigid-body torque explains the measured torque better by "
@@ -222,15 +218,15 @@ class Columns(Check):
         if kind == "torque_sign":
             columns = [f"tau{j + 1}" for j in joints]
             what = f"the torque of {names} has the opposite sign"
-            remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
+            remedy = remedy_of("flip", columns)
         elif kind == "motion_sign":
             columns = [f"q{j + 1}" for j in joints]
             what = f"position and velocity of {names} have the opposite sign"
-            remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
+            remedy = remedy_of("flip", columns)
         elif kind == "joint_sign":
             columns = [f"{q}{j + 1}" for j in joints for q in ("q", "tau")]
             what = f"the direction of {names} is opposite to that of the robot's description"
-            remedy = (f"--flip {','.join(columns)}", f"flip={columns}")
+            remedy = remedy_of("flip", columns)
         elif kind in ORDERS:
             what, remedy = _ordered(measurement, final)
         elif kind == "summed":
@@ -239,14 +235,12 @@ class Columns(Check):
                 "relative to a link other than its parent"
             )
             others = {f"q{j + 1}": f"{'-' * (x < 0)}q{j}" for j, x in final.summed if j in joints}
-            words = ",".join(f"{name}={other}" for name, other in others.items())
-            remedy = (f"--summed {words}", f"summed={others}")
+            remedy = remedy_of("summed", others)
         elif kind == "zero":
             values = ", ".join(f"{np.rad2deg(v):.0f} deg" for j, v in final.zero if j in joints)
             what = f"the zero of {names} is off by about {values}"
             pairs = {f"q{j + 1}": round(v, 4) for j, v in final.zero if j in joints}
-            words = ",".join(f"{name}={value}" for name, value in pairs.items())
-            remedy = (f"--zero {words}", f"zero={pairs}")
+            remedy = remedy_of("zero", pairs)
         else:
             gravity = [round(x, 2) + 0.0 for x in (final.gravity or ())]
             words = ",".join(f"{x:g}" for x in gravity)
@@ -260,9 +254,9 @@ class Columns(Check):
                 what = "the torque contains no gravity: it was removed"
                 if changes[0].restorable:
                     what += " with the bodies of the description"
-                    remedy = ("--restore-gravity", "restore_gravity=True")
+                    remedy = remedy_of("restore_gravity", True)
                 else:
-                    remedy = ("--gravity none", "gravity='none'")
+                    remedy = remedy_of("gravity", "none")
         return self.suspicion(what, evidence, certainty, joints, remedy)
 
 
@@ -282,16 +276,14 @@ def _ordered(measurement: Measurement, final: Reading) -> tuple[str, tuple[str, 
     moved = sorted(
         {k for order in orders.values() for k, c in zip(every, order, strict=True) if c != k + 1}
     )
-    names = ", ".join(measurement.joint(k) for k in moved)
+    names = measurement.joints(moved)
     if motion == torque:
-        words = ",".join(map(str, motion))
         what = f"the columns of {names} are not in the order of the robot's joints"
-        return what, (f"--order {words}", f"order={motion}")
+        return what, remedy_of("order", motion)
     orders = {q: order for q, order in orders.items() if order != own}
     called = {"motion": "positions and velocities", "tau": "torques"}
-    said = " and ".join(called[q] for q in orders)
-    words = ",".join(f"{q}={','.join(map(str, order))}" for q, order in orders.items())
-    return f"the {said} of {names} are exchanged", (f"--order {words}", f"order={orders}")
+    said = listed([called[q] for q in orders])
+    return f"the {said} of {names} are exchanged", remedy_of("order", orders)
 
 
 def _torque_order(reading: Reading, every: Iterable[int]) -> list[int]:

@@ -18,7 +18,7 @@ from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import is_short
 from skidyn.measurement._score import Score
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 from skidyn.measurement._torque import LEAST, SURE, readable_fits
 
 #: Smallest delay that is reported, s, how many standard errors it must have, and how far the lag of
@@ -151,7 +151,7 @@ class TorqueDelay(Check):
                 f"{1e3 * found.error:.1f} ms, equal in {n_alike} of "
                 f"{measurement.n_joints} joints)",
                 "suspected",
-                remedy=(f"--late tau={late:g}", f"late={{'tau': {late:g}}}"),
+                remedy=remedy_of("late", {"tau": late}),
             )
             return
         yield from self._of_joints(measurement, fits, found)
@@ -211,14 +211,13 @@ class TorqueDelay(Check):
             f"which improves the fit by {found.gains[k]:.0f} (log-likelihood)",
             "suspected",
             [k],
-            (f"--late tau{k + 1}={lag:g}", f"late={{'tau{k + 1}': {lag:g}}}"),
+            remedy_of("late", {f"tau{k + 1}": lag}),
         )
 
     def _late_motion(self, measurement: Measurement, moved: LateMotion) -> Suspicion:
         """Position and velocity of one joint that are late."""
         lag, k = float(f"{_whole(measurement, moved.lag):.5f}"), moved.joint
         late = {f"q{k + 1}": lag, f"dq{k + 1}": lag}
-        words = ",".join(f"{name}={value:g}" for name, value in late.items())
         return self.suspicion(
             f"position and velocity of {measurement.joint(k)} are "
             f"{'late' if lag > 0 else 'early'} by about {abs(1e3 * lag):.1f} ms relative to those "
@@ -228,7 +227,7 @@ class TorqueDelay(Check):
             f"{max(moved.own_gain, moved.common_gain):.0f}",
             "suspected",
             [k],
-            (f"--late {words}", f"late={late}"),
+            remedy_of("late", late),
         )
 
     def _late_torque(self, measurement: Measurement, moved: LateMotion) -> Suspicion:
@@ -243,7 +242,7 @@ class TorqueDelay(Check):
             f"instead by {moved.gain:.0f}",
             "suspected",
             [k],
-            (f"--late tau{k + 1}={lag:g}", f"late={{'tau{k + 1}': {lag:g}}}"),
+            remedy_of("late", {f"tau{k + 1}": lag}),
         )
 
     def _late_command(self, lag: float, error: float, n_alike: int) -> Suspicion:

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
+from skidyn._text import trajectories_told
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import Fits, Reading
+from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import ALIKE, Measurement
-from skidyn.measurement._readings import FEWEST_ROWS, MOST_ROWS
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._peak import climb
+from skidyn.measurement._reading import Reading
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 DEGREE = np.pi / 180
 #: Units of time, of velocities and of positions, by the slope of integrated velocity on position.
@@ -72,7 +74,7 @@ class ClockUnit(Check):
                     f"the integrated velocities are {typical:.4g} times the changes of position "
                     f"(median over {len(slopes)} joints)",
                     "certain",
-                    remedy=unit_remedy({"time": unit}),
+                    remedy=remedy_of("units", {"time": unit}),
                 )
                 return
         shared = measurement.velocity_scale
@@ -91,7 +93,7 @@ class ClockUnit(Check):
                 f"time may be in {unit}",
                 f"the median time step is {1 / measurement.rate:.4g} s",
                 "noted" if agrees else "suspected",
-                remedy=unit_remedy({"time": unit}),
+                remedy=remedy_of("units", {"time": unit}),
             )
             return
         if measurement.lost:
@@ -120,7 +122,7 @@ class ClockUnit(Check):
             f"integrated velocities are {shared:.4g} times the changes of position, equally in "
             f"all joints{doubt}",
             "certain" if told else "suspected",
-            remedy=(f"--gain {best}={value:g}", f"gain={{'{best}': {value:g}}}"),
+            remedy=remedy_of("gain", {best: value}),
         )
 
 
@@ -145,7 +147,7 @@ class PositionUnit(Check):
                     f"velocities are {typical:.4g} times the differentiated positions (median over "
                     f"{len(slopes)} joints)",
                     "certain",
-                    remedy=unit_remedy({"q": unit}),
+                    remedy=remedy_of("units", {"q": unit}),
                 )
                 return
         odd = _odd_runs(measurement)
@@ -153,8 +155,7 @@ class PositionUnit(Check):
             measurement.odd = True
             largest = np.abs(measurement.signals.q).max()
             yield self.suspicion(
-                f"in trajectory {', '.join(map(str, odd))} positions have a different unit than "
-                "in the others",
+                f"in {trajectories_told(odd)} positions have a different unit than in the others",
                 f"their spread there is {min(odd.values()):.3g} times that of the others, up to "
                 f"{largest:.4g} rad; fix that file, or leave it out",
                 "certain",
@@ -171,7 +172,7 @@ class PositionUnit(Check):
                 f"{1 / shared:.5g} times as fast as the velocities imply ({counts:.6g} per turn)",
                 "certain",
                 np.flatnonzero(far),
-                (f"--gain q={shared:.9g}", f"gain={{'q': {shared:.9g}}}"),
+                remedy_of("gain", {"q": float(f"{shared:.9g}")}),
             )
             return
         both = {"q": "deg", "dq": "deg/s"} if abs(typical - 1) < NEAR else {"q": "deg"}
@@ -192,14 +193,13 @@ class PositionUnit(Check):
             slope, likeness = measurement.velocities[k]
             both = likeness > ALIKE and abs(slope - 1) < NEAR
             gains = dict.fromkeys([f"q{k + 1}", f"dq{k + 1}"] if both else [f"q{k + 1}"], 1e-3)
-            words = ",".join(f"{name}={size:g}" for name, size in gains.items())
             measurement.millimetres.add(k)
             yield self.suspicion(
                 f"the position of {measurement.joint(k)} looks like millimetres",
                 f"it reaches {largest[k]:.4g} where the limit is {limits[k]:.3g} m",
                 "certain",
                 [k],
-                (f"--gain {words}", f"gain={gains}"),
+                remedy_of("gain", gains),
             )
 
     def _by_turns(self, measurement: Measurement, both: dict[str, str]) -> Iterator[Suspicion]:
@@ -213,7 +213,7 @@ class PositionUnit(Check):
                 f"q{k + 1} reaches {largest[k]:.4g} rad, {largest[k] / 2 / np.pi:.1f} turns",
                 "suspected" if int(np.sum(largest > 4 * np.pi)) > 1 else "noted",
                 [k],
-                unit_remedy(both),
+                remedy_of("units", both),
             )
 
     def _beyond_limits(self, measurement: Measurement, both: dict[str, str]) -> Iterator[Suspicion]:
@@ -245,14 +245,13 @@ class PositionUnit(Check):
         if ratio is not None and (not degrees or gained >= DECISIVE):
             value = float(f"{1 / ratio:.4g}")
             moving = dict.fromkeys(both, value)
-            words = ",".join(f"{name}={size:g}" for name, size in moving.items())
             yield self.suspicion(
                 "positions and velocities are those of the motors before the gears, or have an "
                 "unknown unit",
                 f"{seen}; divided by {ratio:.3g} they explain the torque best",
                 "certain",
                 np.flatnonzero(outside),
-                (f"--gain {words}", f"gain={moving}"),
+                remedy_of("gain", moving),
             )
         elif degrees and joints is not None and ratio is not None and gained > LEAST:
             yield self.suspicion(
@@ -270,7 +269,7 @@ class PositionUnit(Check):
                 f"{seen}; read as degrees it would be {largest[k] * DEGREE:.3g} rad",
                 "certain" if certain else "suspected",
                 np.flatnonzero(outside),
-                unit_remedy(both),
+                remedy_of("units", both),
             )
         elif _too_far(measurement, DISTANT).any():
             yield self.suspicion(
@@ -368,7 +367,7 @@ def _identified_size(
     fits: Fits, sizes: Array, joints: frozenset[int] | None
 ) -> tuple[float, float]:
     """Factor of positions at which identified bodies fit best, and its gain over far ones."""
-    few = fits.thinned(max(FEWEST_ROWS, MOST_ROWS // fits.n_joints)).with_loads()
+    few = fits.few.with_loads()
     fitted = [few.identified(_sized(x, joints)) for x in sizes]
     likely = np.array([outcome.likelihood.sum() for outcome in fitted])
     best = int(np.argmax(likely))
@@ -402,20 +401,14 @@ def _sharpened(fits: Fits, size: float, joints: frozenset[int] | None) -> float:
     Gears have whole ratios, mostly round ones.
     """
     fits = fits.loaded(_sized(size, joints))
-    inflation = np.maximum(fits.identified(_sized(size, joints)).inflation, 1.0)
+    inflation = fits.identified(_sized(size, joints)).inflation
 
     def likelihood(log: float) -> float:
         outcome = fits.identified(_sized(float(np.exp(log)), joints))
         return float(np.sum(outcome.likelihood / inflation))
 
-    first = log = float(np.log(size))
-    step, best = APART, likelihood(log)
-    while step > FINEST and abs(log - first) <= NOT_FAR:  # the maximum is narrow without noise
-        near, other = max((likelihood(x), x) for x in (log - step, log + step))
-        if near > best:
-            best, log = near, other
-        else:
-            step /= 2
+    first = float(np.log(size))
+    log, best = climb(likelihood, first, APART, FINEST, NOT_FAR)
     bend = 2 * best - likelihood(log - BEND) - likelihood(log + BEND)
     if bend <= 0 or abs(log - first) > NOT_FAR:
         return size  # bodies compensate any size
@@ -467,12 +460,6 @@ class WrappedPosition(Check):
                         f"it jumps by a full turn of {turn:.4g} {unit} {count} time(s)",
                         "certain",
                         [int(k)],
-                        ("--unwrap", "unwrap=True"),
+                        remedy_of("unwrap", True),
                     )
                     break
-
-
-def unit_remedy(units: dict[str, str]) -> tuple[str, str]:
-    """The remedy with units."""
-    words = ",".join(f"{name}={unit}" for name, unit in units.items())
-    return f"--units {words}", f"units={units}"

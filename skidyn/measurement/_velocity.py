@@ -11,11 +11,12 @@ import numpy as np
 
 from skidyn._signals import Array, Signals
 from skidyn.measurement._check import Check
-from skidyn.measurement._fits import Reading
 from skidyn.measurement._lowpass import TRIED, summit, suspect_lowpass, without_lowpass
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._measures import velocity_consistency
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._peak import vertex
+from skidyn.measurement._reading import Reading
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 from skidyn.measurement._tachometer import Fault, find_fault
 from skidyn.measurement._units import (
     CLOCKS,
@@ -25,7 +26,6 @@ from skidyn.measurement._units import (
     VELOCITIES,
     gained,
     is_near,
-    unit_remedy,
     unnamed_scale,
 )
 
@@ -71,19 +71,18 @@ class Velocity(Check):
         if order is not None:
             moved = [k for k, column in enumerate(order) if column != k]
             numbers = [column + 1 for column in order]
-            names = ", ".join(measurement.joint(k) for k in moved)
-            words = ",".join(map(str, numbers))
+            names = measurement.joints(moved)
             told = self.suspicion(
                 f"the velocities of {names} are exchanged",
                 "each is the derivative of another joint's position",
                 "certain",
                 moved,
-                (f"--order dq={words}", f"order={{'dq': {numbers}}}"),
+                remedy_of("order", {"dq": numbers}),
             )
             return [told]
         constant = _constant(measurement)
         if constant:
-            names = ", ".join(measurement.joint(k) for k in constant)
+            names = measurement.joints(constant)
             told = self.suspicion(
                 f"the velocity of {names} does not belong to the position: one of them is constant",
                 "the other changes in most rows",
@@ -126,12 +125,9 @@ class Velocity(Check):
             "offset": f"the velocity of {name} has an offset of {fault.value:.3g} {unit}",
             "clipped": f"the velocity of {name} is clipped at {fault.value:.3g} {unit}",
         }[fault.kind]
-        remedy = (f"--derive {column}", f"derive=['{column}']")
+        remedy = remedy_of("derive", [column])
         if fault.kind == "offset":
-            remedy = (
-                f"--zero {column}={fault.value:.4g}",
-                f"zero={{'{column}': {fault.value:.4g}}}",
-            )
+            remedy = remedy_of("zero", {column: float(f"{fault.value:.4g}")})
         return self.suspicion(
             what,
             f"this explains {1 - fault.left:.0%} of the squared difference from the rate of the "
@@ -151,7 +147,7 @@ class Velocity(Check):
         )
 
     def _told(self, measurement: Measurement, cause: str, joints: list[int]) -> Suspicion:
-        names = ", ".join(measurement.joint(k) for k in joints)
+        names = measurement.joints(joints)
         slopes = ", ".join(
             f"{slope / measurement.clock:.4g} (correlation {likeness:.3f})"
             for slope, likeness in (measurement.velocities[k] for k in joints)
@@ -171,30 +167,33 @@ class Velocity(Check):
                 evidence,
                 "certain",
                 joints,
-                (f"--flip {','.join(columns)}", f"flip={columns}"),
+                remedy_of("flip", columns),
             )
         every = len(joints) == measurement.n_joints
         if cause in ("scale", "other"):
             what = f"the velocity of {names} is not the derivative of the position"
             if cause == "other":
                 columns = [f"dq{k + 1}" for k in joints]
-                derive = (f"--derive {','.join(columns)}", f"derive={columns}")
+                derive = remedy_of("derive", columns)
                 return self.suspicion(what, evidence, "suspected", joints, derive)
             pairs = {f"dq{k + 1}": float(f"{1 / measurement.velocities[k][0]:.4g}") for k in joints}
-            words = ",".join(f"{name}={value:g}" for name, value in pairs.items())
             return self.suspicion(
                 what,
                 f"{evidence}; its scale differs",
                 "suspected",
                 joints,
-                (f"--gain {words}", f"gain={pairs}"),
+                remedy_of("gain", pairs),
             )
         quantity, unit = cause.split("=")
         units = {quantity: unit} if every else {f"{quantity}{k + 1}": unit for k in joints}
         what = "velocities" if quantity == "dq" else "positions"
         unit = {"deg": "degrees", "rev": "turns"}.get(unit, unit)
         return self.suspicion(
-            f"{what} look like {unit} on {names}", evidence, "certain", joints, unit_remedy(units)
+            f"{what} look like {unit} on {names}",
+            evidence,
+            "certain",
+            joints,
+            remedy_of("units", units),
         )
 
 
@@ -297,7 +296,7 @@ class VelocityDelay(Check):
             f"{sum(map(np.isfinite, lags.values()))} moving joints: it was filtered, or stamped by "
             "another clock",
             "suspected",
-            remedy=(f"--late {column}={value:g}", f"late={{'{column}': {value:g}}}"),
+            remedy=remedy_of("late", {column: value}),
         )
 
     def _filtered(
@@ -332,7 +331,7 @@ class VelocityDelay(Check):
                 "by another clock",
                 "suspected",
                 [k],
-                (f"--late {column}={value:g}", f"late={{'{column}': {value:g}}}"),
+                remedy_of("late", {column: value}),
             )
 
 
@@ -385,10 +384,8 @@ def _lag(signals: Signals, k: int) -> float:
         return float("nan")
     if errors[best] > 0.1 * plain:
         return float("nan")
-    left, middle, right = errors[best - 1 : best + 2]
-    bend = left - 2 * middle + right
     step = lags[1] - lags[0]
-    lag = lags[best] + step * (0.5 * (left - right) / bend if bend > 0 else 0.0)
+    lag = lags[best] + step * (vertex(*-errors[best - 1 : best + 2]) or 0.0)
     return float(lag) if errors[best] < (1 - TAKEN) * errors[len(lags) // 2] else 0.0
 
 
@@ -564,5 +561,5 @@ class JoinedRecordings(Check):
                 f"continue from there (rows {shown}; {measurement.joint(joint)} by "
                 f"{abs(s.q[rows[0], joint] - s.q[rows[0] - 1, joint]):.3g})",
                 "certain",
-                remedy=("--split-leaps", "split_leaps=True"),
+                remedy=remedy_of("split_leaps", True),
             )

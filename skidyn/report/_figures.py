@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from skidyn._text import listed
+
 Number = float | None
 
 #: Colours of the two sides of a comparison, by their names in page.css.
@@ -55,7 +57,7 @@ def finding_charts(finding: dict[str, Any], units: Sequence[str]) -> list[dict[s
     Each is the curve or map with ``drawn``, its figure, and ``over``, its variables in words.
     """
     maps = [
-        {**table, "drawn": map_figure(table), "over": " and ".join(table["variables"])}
+        {**table, "drawn": map_figure(table), "over": listed(table["variables"])}
         for table in finding["maps"]
     ]
     curves = [

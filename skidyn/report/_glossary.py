@@ -37,6 +37,8 @@ MEANINGS = {
     "without forces": "A model that keeps the initial velocity of a piece. A model that is "
     "useful for simulation must have a smaller error.",
     "q-value": "Expected share of false findings among all findings reported at this level.",
+    "p-value": "Probability of a change of the error that is at least as large, if the torque does "
+    "not depend on the signal.",
     "trajectory": "One piece of motion of the log, with its number in the log, or counted from "
     "1. Errors are held out by whole trajectories if there are enough of them.",
 }

@@ -8,7 +8,7 @@ from typing import Any
 
 from skidyn._bundled import bundled
 from skidyn._optional import import_optional
-from skidyn._text import digits, inside, raised
+from skidyn._text import digits, inside, joints_told, listed, raised
 from skidyn.effects import get_effect, list_effects
 from skidyn.report._glossary import meaning
 from skidyn.report._picture import Canvas, Summary, pictures
@@ -67,6 +67,8 @@ def _environment() -> Any:
         short=short,
         mathml=mathml,
         meaning=meaning,
+        joints_told=joints_told,
+        listed=listed,
     )
     return environment
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array, Signals
+from skidyn._signals import Array, Signals, runs_of
 from skidyn.report._decimate import rows_with_peaks
 
 if TYPE_CHECKING:
@@ -89,11 +89,9 @@ def _stretches(
     found: list[list[Any]] = []
     gap = JOIN * float(clock[-1] - clock[0])
     for segment in segments:
-        here = mask[segment].astype(np.int8)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], here, [0]])))
         first = len(found)
-        for a, b in edges.reshape(-1, 2) + segment.start:
-            begin, end = float(clock[a]), float(clock[b - 1])
+        for a, b in zip(*runs_of(mask[segment]), strict=True):
+            begin, end = (float(clock[segment.start + row]) for row in (a, b - 1))
             if len(found) > first and begin - found[-1][1] < gap:
                 found[-1][1] = round(end, 4)
             else:

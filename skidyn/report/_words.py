@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from skidyn._text import inside, listed
+from skidyn._text import inside, joints_told
 from skidyn.effects import get_effect, list_effects
 
 
@@ -16,8 +16,7 @@ def coefficient_told(column: str) -> str:
     if match is None or match[1] not in list_effects():
         return column
     joints = match[3].replace(" ", "").split(",")
-    where = f"joint{'s' if len(joints) > 1 else ''} {listed(joints)}"
-    return f"{match[2]} of {inside(get_effect(match[1]).title)} on {where}"
+    return f"{match[2]} of {inside(get_effect(match[1]).title)} on {joints_told(joints)}"
 
 
 def since_told(date: Any) -> str:

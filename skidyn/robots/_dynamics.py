@@ -129,6 +129,25 @@ class RigidBodyDynamics:
             self._signals(q=q), gravity, parameters=self._parameters(parameters), backend=backend
         )
 
+    def inertial_torque(self, q: Any, ddq: Any, *, parameters: Any = None) -> np.ndarray:
+        """Joint torques that accelerate the robot from rest, without gravity.
+
+        Parameters
+        ----------
+        q, ddq : array-like of shape (n_samples, n_joints)
+            Positions and accelerations.
+        parameters : array-like of shape (n_bodies, 10), default=None
+            Inertial parameters in place of those of the URDF.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_joints)
+            N m; N for prismatic joints.
+        """
+        return self._engine.inverse_dynamics(
+            self._signals(q=q, ddq=ddq), (0.0, 0.0, 0.0), parameters=self._parameters(parameters)
+        )
+
     def coriolis_torque(self, q: Any, dq: Any, *, parameters: Any = None) -> np.ndarray:
         """Centrifugal and Coriolis torques.
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skidyn._columns import command_columns, names_of_table, resolve_columns, trajectory_numbers
 from skidyn._exceptions import LogWarning, SkidynError
-from skidyn._signals import Array, Signals, signals_from
+from skidyn._signals import Array, Signals, rates_of, signals_from
 from skidyn._text import listed
 from skidyn.evidence import smooth_motion
 from skidyn.forward import Controller
@@ -276,12 +276,9 @@ def _read(log: Any, robot: Robot | None) -> tuple[Signals, Array]:
 
 def _late(signals: Signals, reference: Array, delay: float) -> tuple[Array, Array]:
     """The command as received by the servo, and its velocity."""
-    wanted, rate = reference.copy(), np.zeros_like(reference)
+    wanted = reference.copy()
     for rows in signals.segments:
         time = signals.clock[rows]
-        if len(time) < 2:
-            continue
         for j in range(reference.shape[1]):
             wanted[rows, j] = np.interp(time - delay, time, reference[rows, j])
-        rate[rows] = np.gradient(wanted[rows], time, axis=0)
-    return wanted, rate
+    return wanted, rates_of(wanted, signals.clock, signals.segments)

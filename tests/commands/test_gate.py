@@ -39,7 +39,7 @@ def test_a_worn_joint_fails_by_name(here, capsys, tmp_path):
     words = ["compare", "worn.csv", *ARM, "--against", "healthy.csv"]
     assert cli.main([*words, "--fail-above", "2", "--junit", str(report)]) == cli.FAILED
     told = capsys.readouterr().out
-    assert "failed: joint1 above 2 times the usual error" in told
+    assert "failed: the error of joint1 is above 2 times the usual one" in told
     tests = ElementTree.parse(report).getroot()
     assert tests.get("failures") == "1"
     failures = {t.get("name"): t.find("failure") is not None for t in tests.iter("testcase")}

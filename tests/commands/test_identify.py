@@ -24,7 +24,7 @@ def test_identify_by_any_estimator_and_only_what_is_essential(capsys, estimator,
     words = ["identify", *arguments, "--estimator", estimator, "--consistent"]
     assert cli.main([*words, "--essential"]) == cli.DONE
     out = capsys.readouterr().out
-    assert "condition number of the excitation" in out and "others left out" in out
+    assert "condition number of the excitation" in out and "other parameters are left out" in out
 
 
 def test_servos_are_identified_without_torque(servo_diagnosed, run):

@@ -44,11 +44,18 @@ SIZE = {
 #: Kinds that act on all joints, or on the tool: the joints are not chosen.
 WHOLE = ("payload", "time_delay")
 HYSTERESIS = {"dahl", "lugre", "maxwell_slip"}
-#: Six joints take most of the time; where there is little noise, a shorter log shows as much.
-LENGTH = {("ur5", "low"): {"n_trajectories": 6, "duration": 6.0}}
-#: Friction of one joint stands for these where there are six joints.
-ALIKE = ("offset", "asymmetric_friction", "nonlinear_viscous", "temperature_friction")
-#: Kind, robot and noise: each kind with one noise on two joints, and half of them on six.
+#: As much as these effects need.
+LENGTH = {
+    "ur5": {"n_trajectories": 4, "duration": 5.0},
+    "planar arm": {"n_trajectories": 8, "duration": 8.0},
+}
+#: Friction of one joint stands for these where there are six joints. Viscous friction is named on
+#: three of six in test_reconsideration.py.
+ALIKE = (
+    *("viscous", "stribeck", "offset", "asymmetric_friction"),
+    *("nonlinear_viscous", "temperature_friction"),
+)
+#: Kind, robot and noise: each kind with one noise on two joints, and some of them on six.
 CASES = [
     (kind, robot, noise)
     for r, robot in enumerate(ROBOTS)
@@ -67,7 +74,7 @@ def hidden_log(kind, robot, noise):
     joint = 4 if kind == "rotor_inertia" and robot == "ur5" else 2
     joints = None if kind in (None, *WHOLE) else [joint]
     options = {"joints": joints, "noise": noise, "base": base}
-    options |= LENGTH.get((robot, noise), {})
+    options |= LENGTH[robot]
     log = make_hidden_effect_log(ROBOTS[robot](), kind, random_state=11, **options)
     return log, RBDRegressor(log.robot, base)
 
@@ -263,7 +270,7 @@ def test_a_robot_that_rests_is_refused_by_a_sentence():
 )
 def test_a_completed_model_is_complete(load, kind):
     """Also where the effect's columns need the load or the torque of the model itself."""
-    log = make_hidden_effect_log(load(), kind, joints=[2], n_trajectories=6, duration=6.0)
+    log = make_hidden_effect_log(load(), kind, joints=[2], n_trajectories=4, duration=4.0)
     model = RBDRegressor(log.robot, ("viscous", "coulomb"))
     first = diagnose(model, log.X, log.y)
     assert [(f.kind, f.joints) for f in first.findings] == [(kind, (2,))]
@@ -277,7 +284,7 @@ def test_a_completed_model_is_complete(load, kind):
 @pytest.fixture(scope="module")
 def sticking():
     return make_hidden_effect_log(
-        load_planar_arm(), "stribeck", joints=[2], n_trajectories=8, duration=4.0
+        load_planar_arm(), "stribeck", joints=[2], n_trajectories=4, duration=4.0
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from skidyn.datasets import load_panda, load_planar_arm, load_scara, make_hidden_effect_log
-from skidyn.diagnosis import diagnose
+from skidyn.diagnosis import Settings, diagnose
 from skidyn.identification import RBDRegressor
 
 
@@ -56,14 +56,15 @@ def with_coloured_noise():
     steps = np.random.default_rng(2).normal(size=log.y.shape)
     slow = lfilter([1.0], [1.0, -0.97], steps, axis=0)
     slow /= slow.std(0)
-    noise = diagnose(RBDRegressor(log.robot), log.X, log.y).noise
+    nothing = Settings(max_findings=0)
+    noise = diagnose(RBDRegressor(log.robot), log.X, log.y, checks=(), settings=nothing).noise
     return log, noise, slow
 
 
 def test_noise_that_is_correlated_on_all_joints_alike_is_no_effect(with_coloured_noise):
     log, noise, slow = with_coloured_noise
 
-    found = diagnose(RBDRegressor(log.robot), log.X, log.y + 2 * noise * slow)
+    found = diagnose(RBDRegressor(log.robot), log.X, log.y + 2 * noise * slow, checks=())
 
     assert found.noise_is_coloured
     assert found.verdict == "complete"
@@ -76,7 +77,7 @@ def test_as_much_on_one_joint_is_told(with_coloured_noise):
     torque = log.y.copy()
     torque[:, 2] += 6 * noise[2] * slow[:, 2]
 
-    found = diagnose(RBDRegressor(log.robot), log.X, torque)
+    found = diagnose(RBDRegressor(log.robot), log.X, torque, checks=())
 
     assert not found.noise_is_coloured
     assert found.verdict == "unknown"
@@ -94,8 +95,7 @@ def test_noise_of_positions_is_felt_by_rotors():
     with_rotors = torque + 0.5 * X[[f"ddq{j + 1}" for j in range(4)]].to_numpy()
     model = RBDRegressor(log.robot, ("viscous", "coulomb", "rotor_inertia"))
 
-    light = diagnose(model, X, torque)
-    heavy = diagnose(model, X, with_rotors)
+    light, heavy = (diagnose(model, X, y, effects=(), checks=()) for y in (torque, with_rotors))
 
     assert np.all(heavy.parts.position_noise > light.parts.position_noise)
 

@@ -12,15 +12,15 @@ from skidyn.exceptions import EffectError
 from skidyn.identification import RBDRegressor
 
 
-def diagnosis_of(kind):
+def diagnosis_of(kind, *rivals):
     options = {"joints": [2], "noise": "high", "n_trajectories": 6, "duration": 6.0}
     log = make_hidden_effect_log(load_planar_arm(), kind, random_state=5, **options)
-    return diagnose(RBDRegressor(log.robot), log.X, log.y)
+    return diagnose(RBDRegressor(log.robot), log.X, log.y, effects=[kind, *rivals], checks=())
 
 
 @pytest.fixture(scope="module")
 def diagnosis():
-    return diagnosis_of("maxwell_slip")
+    return diagnosis_of("maxwell_slip", "dahl")
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def test_the_motion_as_a_table(motion):
 
 
 def test_a_rival_that_contains_the_effect_cannot_be_told_from_it():
-    diagnosis = diagnosis_of("spring")
+    diagnosis = diagnosis_of("spring", "nonlinear_spring")
 
     motion = design_separating_motion(diagnosis, "spring", "nonlinear_spring", duration=5)
 

@@ -135,10 +135,12 @@ def test_a_doubtful_log_has_no_findings_about_its_servos(servo_log):
     assert not {f.kind for f in found.findings} & set(SETTINGS)
 
 
-def test_a_deadband_is_added_to_the_controller(servo_log):
+def test_a_deadband_that_nobody_was_told_is_named_and_added_to_the_controller(servo_log):
     loose = servo_log({}, deadband=(0.0, 0.01))
     found = diagnosed(loose, effects=["stribeck"])
     (motion,) = found.explain_servo_motion()
+    assert motion.parameters == {"deadband": pytest.approx(0.01, rel=0.05)}
+    assert motion.sentence.startswith("Deadband of the servo of joint 2 (deadband = 0.010")
     entry = found.to_dict()["effects"][-1]
     assert (entry["kind"], entry["joints"], entry["judged_by"]) == ("servo_deadband", [2], "motion")
     assert covers(entry["parameters"]["deadband"], 0.01)

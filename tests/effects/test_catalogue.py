@@ -35,8 +35,10 @@ KINDS = {
     "temperature_offset": (load_planar_arm, "dtau_dT", 0.05),
     "environment_contact": (load_planar_arm, "z0", 0.05),
 }
-#: Six joints take most of the time, and a shorter log shows as much on them.
+#: As much as these effects need.
 SHORT = {"n_trajectories": 6, "duration": 6.0}
+#: Springs whose form shows at the ends of the travel, which a longer log has more often.
+LONG = ("nonlinear_spring", "gravity_compensator")
 #: Those of tests/diagnosis/test_diagnosis.py, test_servo_settings.py and test_motor_load.py.
 ELSEWHERE = {
     *("viscous", "coulomb", "offset", "asymmetric_friction", "stribeck", "nonlinear_viscous"),
@@ -96,7 +98,7 @@ class Native:
     force: tuple[float, ...] = ()
     load: Callable = load_planar_arm
     base: tuple[str, ...] = ("viscous", "coulomb")
-    trajectories: int = 8
+    trajectories: int = 4
 
 
 def more(name, index, value):
@@ -126,13 +128,11 @@ NATIVE = {
     "rotor_inertia": Native((2,), "Ia", 0.3, edit=more("dof_armature", 1, 0.3)),
     "spring": Native((2,), "k", 2.5, edit=more("jnt_stiffness", 1, 2.5)),
     "coupling_spring": Native((1, 2), "k", 2.0, tendon='stiffness="2" springlength="0"'),
-    "coupled_friction": Native((1, 2), "Fc", 0.6, tendon='frictionloss="0.6"'),
-    "coupled_inertia": Native(
-        (5, 6), "Ia", 0.2, tendon='armature="0.2"', load=load_ur5, trajectories=4
-    ),
+    "coupled_friction": Native((1, 2), "Fc", 0.6, tendon='frictionloss="0.6"', trajectories=8),
+    "coupled_inertia": Native((5, 6), "Ia", 0.2, tendon='armature="0.2"', load=load_ur5),
     "payload": Native((2,), "mass", 0.8, loaded=more("body_mass", -1, 0.8)),
-    "external_wrench": Native((1, 2), "force_x", 3.0, force=(3.0, 0.0, -4.0)),
-    "base_tilt": Native((), "tilt_deg", 3.0, edit=tilt, load=load_srs_arm, trajectories=4),
+    "external_wrench": Native((1, 2), "force_x", 3.0, force=(3.0, 0.0, -4.0), trajectories=8),
+    "base_tilt": Native((), "tilt_deg", 3.0, edit=tilt, load=load_srs_arm),
     "end_stop": Native((2,), "q_lim", 0.6, edit=stiff_limits),
 }
 
@@ -229,7 +229,7 @@ def test_every_kind_has_its_test():
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_simulated_effect_is_named_with_its_joints_and_size(kind):
     load, name, tolerance = KINDS[kind]
-    length = {} if load is load_planar_arm else SHORT
+    length = {} if kind in LONG else SHORT
     log = make_hidden_effect_log(load(), kind, noise="low", random_state=11, **length)
 
     diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y)

@@ -2,10 +2,12 @@
 """A user's own effect."""
 
 import numpy as np
+import pytest
 
 from skidyn.effects import Coefficient, Effect, register_effect, unregister_effect
 
 
+@pytest.mark.slow
 def test_diagnosis_finds_a_users_effect(robot):
     from skidyn.datasets import make_hidden_effect_log
     from skidyn.diagnosis import diagnose

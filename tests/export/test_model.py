@@ -25,7 +25,7 @@ def test_the_function_is_the_model_without_what_is_left_out(fit, states):
     robot = load_planar_arm()
     model = fit(robot, ["viscous", *MEMORY])
     text, namespace = python_source(model), {}
-    assert "Not in it: dahl of joint1; maxwell_slip of joint2; offset of joint1." in text
+    assert "Left out: dahl of joint1; maxwell_slip of joint2; offset of joint1." in text
     exec(text, namespace)
     motion = states(robot)
     for term in MEMORY:

@@ -34,6 +34,7 @@ def test_simulates_better_than_least_squares_of_a_slow_log(clean):
     assert np.all(low < high)
 
 
+@pytest.mark.slow
 def test_exact_data_keep_the_exact_model(clean):
     """What least squares has right already, a simulation does not spoil."""
     frame = clean.X[clean.frame["trajectory"] == 1].reset_index(drop=True)
@@ -67,6 +68,7 @@ def servo_log(clean):
     return arm, servo, log.assign(**{c: motion[c].to_numpy() for c in ("q1", "q2", "dq1", "dq2")})
 
 
+@pytest.mark.slow
 def test_commands_drive_the_model_through_a_controller(servo_log):
     """A torque whose constant is wrong is where the fit starts, and not where it ends."""
     arm, servo, log = servo_log

@@ -304,6 +304,7 @@ def test_missing_values_are_refused_by_the_model():
         RBDRegressor(log.robot).fit(X, log.y)
 
 
+@pytest.mark.slow
 def test_a_trajectory_of_a_million_rows_is_fitted_exactly():
     robot = load_planar_arm()
     t = np.arange(1_000_000) / 1000.0

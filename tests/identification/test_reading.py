@@ -123,6 +123,7 @@ def test_folds_of_trajectories_are_no_shuffled_rows():
         cross_val_score(RBDRegressor(ROBOT), LOG.X, LOG.y, cv=TrajectoryKFold(4))
 
 
+@pytest.mark.slow
 def test_a_clock_as_the_column_of_trajectories_is_named():
     with pytest.raises(ColumnError, match="trajectory='time' and time='auto' .* column 'time'"):
         RBDRegressor(ROBOT, trajectory="time").fit(FULL, LOG.y)

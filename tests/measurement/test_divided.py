@@ -32,14 +32,13 @@ def told(frame):
     return [s for s in check_log(frame, ROBOT).checks if s.certainty != "noted"]
 
 
-@pytest.mark.parametrize("count", [2, 3])
 @pytest.mark.parametrize(
-    "name, change, what",
+    "name, change, what, count",
     [
-        ("tau3", lambda x: -x, "opposite sign"),
-        ("tau6", lambda x: -x, "opposite sign"),
-        ("tau2", lambda x: 10 * x, " is 10"),
-        ("q3", lambda x: x + 0.7, "the zero of"),
+        ("tau3", lambda x: -x, "opposite sign", 2),
+        ("tau6", lambda x: -x, "opposite sign", 3),
+        ("tau2", lambda x: 10 * x, " is 10", 3),
+        ("q3", lambda x: x + 0.7, "the zero of", 2),
     ],
 )
 def test_recordings_of_two_kinds_are_told_alone(name, change, what, count):

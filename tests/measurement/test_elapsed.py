@@ -85,7 +85,7 @@ def test_recordings_in_reversed_order():
     told = told_of(frame)["lost_rows"]
 
     assert told.certainty == "certain"
-    assert "trajectories 1 are in reversed order" in told.suspicion
+    assert "trajectory 1 are in reversed order" in told.suspicion
 
 
 def test_velocities_of_the_other_sign_in_one_recording_are_not_rows_in_reversed_order():

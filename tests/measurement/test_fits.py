@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from skidyn.measurement import Measurement
-from skidyn.measurement._fits import Reading
+from skidyn.measurement._reading import Reading
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])

@@ -10,6 +10,7 @@ def test_joints_have_names_and_numbers(signals, torque):
     measurement = Measurement(signals, torque, None, ("shoulder", "elbow"))
     assert (measurement.n_joints, measurement.n_samples) == (2, len(torque))
     assert "elbow" in measurement.joint(1)
+    assert measurement.joints([0, 1]) == "joint 1 (shoulder) and joint 2 (elbow)"
 
 
 def test_trajectories_end_where_positions_leap(signals, torque):

@@ -57,34 +57,10 @@ def test_a_torque_that_is_turned_round_twice_is_as_it_was():
     assert told.remedy.option == "--flip tau2,tau3,tau4,tau5,tau6"
 
 
-def test_a_description_without_gravity(arm, recorded, told_of):
-    told = told_of(recorded.frame, replace(arm, gravity=np.zeros(3)))["reading"]
-    assert told.remedy.option.startswith("--gravity=")
-    x, y, z = (float(v) for v in told.remedy.option.partition("=")[2].split(","))
-    assert z == pytest.approx(-9.8, abs=0.3) and abs(y) < 0.1 and abs(x) < 2
-
-
-@pytest.mark.parametrize("joint", [3, 4])
-def test_an_angle_against_the_base(joint):
-    log = make_hidden_effect_log(load_ur5(), None, n_trajectories=4, duration=4.0)
-    frame = log.frame
-    sums = {f"{x}{joint}": frame[f"{x}{joint}"] + frame[f"{x}{joint - 1}"] for x in ("q", "dq")}
-    told = {s.check: s for s in check_log(log.frame.assign(**sums), log.robot).checks}["reading"]
-    assert told.remedy.option == f"--summed q{joint}=q{joint - 1}"
-    assert told.joints == (joint,) and told.certainty == "certain"
-
-
 def test_upside_down_goes_before_a_first_joint_half_a_turn_off(arm, recorded, told_of):
     told = told_of(recorded.frame, replace(arm, gravity=-arm.gravity))["reading"]
     assert told.remedy.option == "--gravity=0,0,-9.81" and told.certainty == "suspected"
     assert "zero" in told.evidence
-
-
-def test_motions_that_are_exchanged_with_their_torques_in_place(recorded, told_of):
-    frame = recorded.frame
-    changes = {f"{x}{i}": frame[f"{x}{3 - i}"] for x in ("q", "dq") for i in (1, 2)}
-    told = told_of(frame.assign(**changes))["reading"]
-    assert told.certainty == "certain" and told.remedy.option == "--order motion=2,1"
 
 
 def test_zeros_of_two_joints_are_refined_together():

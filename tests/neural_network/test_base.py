@@ -19,6 +19,7 @@ from skidyn.neural_network import LSTMRegressor, NDLRegressor
 SMALL = {"window": 8, "hidden_size": 12, "max_epochs": 15, "random_state": 0}
 
 
+@pytest.mark.slow
 def test_bit_equal_for_any_number_of_processes_and_global_state_untouched(log):
     X, y = log[0].to_numpy(), log[1]
     member = NDLRegressor(**SMALL | {"max_epochs": 2}, trajectory=0, time=1, resample="trajectory")

@@ -190,6 +190,7 @@ def test_bagged_members_are_bit_equal(client, log):
     np.testing.assert_array_equal(got, wanted)
 
 
+@pytest.mark.slow
 def test_grid_search_is_bit_equal(client, log):
     X, y = log
     member = LSTMRegressor(window=4, hidden_size=4, max_epochs=2, random_state=0)

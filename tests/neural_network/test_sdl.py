@@ -79,6 +79,7 @@ def fitted(arm_log, physics=None, **parameters):
     return SDLRegressor(physics or robot, **settings).fit(X, y)
 
 
+@pytest.mark.slow
 def test_rigid_body_and_network_are_optimised_together(arm_log):
     robot, X, y = arm_log
     joint = fitted(arm_log, max_epochs=30)
@@ -141,6 +142,7 @@ def test_contract_of_columns_and_storage(arm_log):
     np.testing.assert_array_equal(by_position.predict(array), expected)
 
 
+@pytest.mark.slow
 def test_not_worse_than_its_physics_on_new_trajectories(arm_log):
     """Noise alone is left: an ungated network adds some of it, a gated one next to nothing."""
     robot, X, y = arm_log

@@ -13,6 +13,7 @@ from skorch.callbacks import EarlyStopping
 from skidyn.neural_network import BLLRegressor
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("one", [False, True])
 def test_any_skorch_network_is_a_member(one):
     rng = np.random.default_rng(0)

@@ -28,7 +28,10 @@ def error(table, log):
     return np.sqrt(np.mean((table[:, -1] - exact)[100:-100] ** 2)) / exact.std()
 
 
-@pytest.mark.parametrize("method", ["butterworth", "kalman", "savitzky_golay"])
+@pytest.mark.parametrize(
+    "method",
+    ["butterworth", pytest.param("kalman", marks=pytest.mark.slow), "savitzky_golay"],
+)
 @pytest.mark.parametrize("noise", [1e-4, 2e-3])
 def test_chosen_cutoff_is_close_to_the_best(method, noise):
     log = record(noise)

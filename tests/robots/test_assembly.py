@@ -77,6 +77,7 @@ def test_locked_leader_locks_its_followers_at_their_offset():
     np.testing.assert_allclose(rotation[0, 0, 0], np.cos(0.5))
 
 
+@pytest.mark.slow
 def test_huge_tree_needs_no_recursion():
     n = 10_000
     parts = [link("l0")]

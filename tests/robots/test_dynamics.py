@@ -166,6 +166,7 @@ def test_mass_scales_torque_and_nothing_else(factor):
     )
 
 
+@pytest.mark.slow
 def test_a_thousand_joints_move_exactly(chain):
     """All about one axis: every joint carries the inertia of what follows it."""
     n = 1000
@@ -292,13 +293,14 @@ def test_mass_matrix(case):
     close(robot.mass_matrix(q), [oracle.mass_matrix(row) for row in q])
 
 
-def test_gravity_and_coriolis(case):
-    robot, oracle, (q, dq, _) = case
+def test_gravity_coriolis_and_inertia(case):
+    robot, oracle, (q, dq, ddq) = case
     zero = np.zeros(robot.n_joints)
     gravity = np.array([oracle.inverse_dynamics(row, zero, zero) for row in q])
     bias = np.array([oracle.inverse_dynamics(*rows, zero) for rows in zip(q, dq, strict=True)])
     close(robot.gravity_torque(q), gravity)
     close(robot.coriolis_torque(q, dq), bias - gravity)
+    close(robot.inertial_torque(q, ddq), robot.inverse_dynamics(q, 0 * dq, ddq) - gravity)
 
 
 def test_forward_dynamics_inverts_inverse_dynamics(case):

@@ -65,14 +65,6 @@ def test_a_joint_that_the_robot_lacks_and_a_short_log_are_refused(sticky_servo):
         explain_servo_motion(model, log[log["trajectory"] == 1], servo)
 
 
-def test_a_deadband_that_nobody_was_told_is_named(servo_log):
-    loose = servo_log({}, deadband=(0.0, 0.01))
-    (found,) = explain_servo_motion(fitted(loose), loose.log, loose.controller)
-    assert (found.kind, found.joint) == ("servo_deadband", 2)
-    assert found.parameters == {"deadband": pytest.approx(0.01, rel=0.05)}
-    assert found.sentence.startswith("Deadband of the servo of joint 2 (deadband = 0.010")
-
-
 def test_effects_of_two_joints_are_named_one_after_the_other(servo_log):
     shapes = {"vs": 0.1, "delta": 2.0}
     sticky = servo_log({Term("stribeck", (1,), shapes): 2.0, Term("stribeck", (2,), shapes): 0.15})

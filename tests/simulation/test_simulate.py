@@ -11,7 +11,9 @@ from skidyn.simulation import simulate
 
 @pytest.mark.parametrize("kind", ["dahl", "load_dependent_friction", "time_delay", "backlash"])
 def test_effect_that_is_there_improves_the_motion(kind):
-    log = make_hidden_effect_log(load_planar_arm(), kind, joints=[1], n_trajectories=4)
+    log = make_hidden_effect_log(
+        load_planar_arm(), kind, joints=[1], n_trajectories=4, duration=5.0
+    )
     train = log.frame["trajectory"] <= 3
     plain = RBDRegressor(log.robot).fit(log.X[train], log.y[train])
     whole = plain.with_effects([(kind, [1])]).fit(log.X[train], log.y[train])

@@ -58,6 +58,7 @@ from skidyn.preprocessing import (
 )
 from skidyn.robots import Robot
 
+pytestmark = pytest.mark.usefixtures("diagnosed_once")
 PENDULUM = Robot.from_urdf(
     '<robot name="pendulum"><link name="base"/><link name="rod"><inertial>'
     '<origin xyz="0.2 0 0"/><mass value="1.5"/>'
