@@ -9,7 +9,7 @@ effects: pre-sliding friction of joint 3 and a spring at joint 2.
 """
 
 # %%
-# The log has 8 trajectories of 6 s of a UR5. Two of them are held out and used only at the end.
+# The log has 8 trajectories of 4 s of a UR5. Two of them are held out and used only at the end.
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -19,7 +19,7 @@ from skidyn.identification import RBDRegressor
 from skidyn.inspection import ErrorBudgetDisplay, ErrorMapDisplay, ResidualDisplay, TorqueDisplay
 
 hidden = {"dahl": {"joints": [3]}, "spring": {"joints": [2], "magnitude": 0.6}}
-log = make_hidden_effect_log(load_ur5(), hidden, n_trajectories=8, duration=6.0, random_state=1)
+log = make_hidden_effect_log(load_ur5(), hidden, n_trajectories=8, duration=4.0, random_state=1)
 aside = (log.X["trajectory"] > 6).to_numpy()
 X, y = log.X[~aside], log.y[~aside]
 

@@ -43,7 +43,12 @@ folder = Path(tempfile.mkdtemp())
 (folder / "arm.urdf").write_text(URDF)
 
 made_up = make_hidden_effect_log(
-    Robot.from_urdf(URDF), "load_dependent_friction", joints=[1], magnitude=1.5
+    Robot.from_urdf(URDF),
+    "load_dependent_friction",
+    joints=[1],
+    magnitude=1.5,
+    n_trajectories=6,
+    duration=6.0,
 )
 files = []
 for number, run in made_up.frame.groupby("trajectory"):

@@ -37,7 +37,7 @@ errors = np.empty((len(ARMS), len(CANDIDATES)))
 chosen = {}
 for row, (arm, effect) in enumerate(ARMS.items()):
     log = make_hidden_effect_log(
-        load_planar_arm(), effect, joints=effect and [1], n_trajectories=6, duration=6.0
+        load_planar_arm(), effect, joints=effect and [1], n_trajectories=6, duration=4.0
     )
     for column, effects in enumerate(CANDIDATES.values()):
         scores = cross_validate(

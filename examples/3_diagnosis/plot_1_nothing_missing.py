@@ -16,7 +16,7 @@ from skidyn.datasets import load_scara, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
-log = make_hidden_effect_log(load_scara(), None, n_trajectories=8, duration=6.0, random_state=5)
+log = make_hidden_effect_log(load_scara(), None, n_trajectories=6, duration=5.0, random_state=5)
 diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y)
 print("verdict:", diagnosis.verdict)
 print("findings:", [finding.kind for finding in diagnosis.findings])

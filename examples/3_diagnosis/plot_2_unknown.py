@@ -16,7 +16,9 @@ from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 from skidyn.inspection import ResidualDisplay
 
-log = make_hidden_effect_log(load_planar_arm(), "unknown_cable", random_state=2)
+log = make_hidden_effect_log(
+    load_planar_arm(), "unknown_cable", n_trajectories=6, duration=6.0, random_state=2
+)
 print("hidden:", log.truth[0]["formula"], "on joints", log.truth[0]["joints"])
 
 # %%

@@ -18,7 +18,9 @@ from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import EffectSearchCV
 from skidyn.identification import RBDRegressor
 
-log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2], random_state=4)
+log = make_hidden_effect_log(
+    load_planar_arm(), "stribeck", joints=[2], duration=5.0, random_state=4
+)
 groups = log.X["trajectory"].to_numpy()
 train, test = next(GroupShuffleSplit(1, test_size=2, random_state=0).split(log.X, groups=groups))
 X, y = log.X.iloc[train], log.y[train]

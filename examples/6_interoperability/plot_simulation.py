@@ -13,7 +13,9 @@ from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.identification import RBDRegressor
 from skidyn.simulation import judge_by_simulation, simulate
 
-log = make_hidden_effect_log(load_planar_arm(), "spring", joints=[1], n_trajectories=4)
+log = make_hidden_effect_log(
+    load_planar_arm(), "spring", joints=[1], n_trajectories=4, duration=6.0
+)
 train, test = log.frame["trajectory"] <= 3, log.frame["trajectory"] == 4
 plain = RBDRegressor(log.robot).fit(log.X[train], log.y[train])
 whole = plain.with_effects([("spring", [1])]).fit(log.X[train], log.y[train])
