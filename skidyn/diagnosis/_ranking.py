@@ -134,8 +134,9 @@ class RankingSearch(SearchState):
         few = len(recordings) <= self.settings.most_recordings and not in_part(own)
         if few or not within_recordings(own):
             return False
+        # A function of time may describe the same difference between recordings.
         return any(
-            h.score > self.settings.recordings_share * own.score
+            h.score > (1.0 if "time" in h.variables else self.settings.recordings_share) * own.score
             for h in ranking
             if not within_recordings(h) and set(own.joints) <= set(h.joints)
         )
@@ -206,11 +207,11 @@ class RankingSearch(SearchState):
         """The first of the best few candidates that is large enough and significant.
 
         Between the shapes of the grid lie others, such as planes of other directions, that remove
-        more: if none is significant among all that were tried, the first that is by itself is
-        tested with its shape refined, as it will be judged later.
+        more: if none is significant among all that were tried, the first of every form that is by
+        itself is tested with its shape refined, as it will be judged later.
         """
-        near = None
-        for i in np.argsort(-order)[: self.settings.shapes_tested]:
+        near: dict[frozenset[str], int] = {}
+        for i in np.argsort(-order)[: self.settings.shapes_tested].tolist():
             candidate = self.pool[i]
             n_rows = int(self.problem.rows.counts[list(candidate.joints)].sum())
             if not drops[i] > self.settings.least_share * n_rows:
@@ -218,15 +219,17 @@ class RankingSearch(SearchState):
             passes = partial(self.significant, candidate=candidate)
             chance = tester.test(candidate.rows, candidate.zeros, passes).chance
             if passes(chance):
-                return int(i)
-            if near is None and candidate.n_shapes and chance < self.settings.level:
-                near = int(i)
-        if near is None:
-            return None
-        model = self.blocks_with([*self.chosen, *chosen])
-        (refined,) = refine(self.problem, model, [self.pool[near]], self.sigma, self.target)
-        chance = tester.test(refined.rows, refined.zeros).chance
-        return near if self.significant(chance, refined) else None
+                return i
+            if candidate.n_shapes and chance < self.settings.level:
+                names = candidate.term.effect.form_names & set(candidate.term.shape)
+                near.setdefault(names, i)
+        model = self.blocks_with([*self.chosen, *chosen]) if near else []
+        for i in near.values():
+            (refined,) = refine(self.problem, model, [self.pool[i]], self.sigma, self.target)
+            chance = tester.test(refined.rows, refined.zeros).chance
+            if self.significant(chance, refined):
+                return i
+        return None
 
     def _still_open(self, added: Candidate, chosen: list[Candidate]) -> Mask:
         """Candidates that may be added to one of the same kind."""
@@ -318,14 +321,16 @@ class RankingSearch(SearchState):
             term = candidate.term.with_shape(trajectories=group)
             return replace(candidate, term=term, rows=self.problem.term_rows(term))
 
-        own = [of((k,)) for k in candidate.term.trajectories or ()]
-        while len(own) > 1:
+        groups: list[tuple[int, ...]] = [(k,) for k in candidate.term.trajectories or ()]
+        while True:
+            own = [of(group) for group in groups]
+            if len(own) < 2:
+                return own
             gain, i, j = self.tester([*self.chosen, *own]).least_difference([c.width for c in own])
             if gain > 2 * self._price(own) * candidate.width:
-                break
-            both = own[i].term.trajectories + own[j].term.trajectories
-            own = [c for k, c in enumerate(own) if k not in (i, j)] + [of(tuple(sorted(both)))]
-        return sorted(own, key=lambda c: c.term.trajectories or ())
+                return own
+            both = tuple(sorted(groups[i] + groups[j]))
+            groups = sorted([*(g for k, g in enumerate(groups) if k not in (i, j)), both])
 
     def _finals(self, rough: list[list[Candidate]], refined: int | None = None) -> list[Hypothesis]:
         """Compare the best kinds with re-estimated noise, the first of them with refined shapes."""

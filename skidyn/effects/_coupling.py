@@ -74,6 +74,7 @@ class CoupledFriction(_PairEffect):
     title = "Coupled friction"
     formula = r"F_v\,\dot x + F_c\,\mathrm{sign}\,\dot x,\quad \dot x = \dot q_i + r\,\dot q_j"
     coefficients = (Coefficient("Fc", "N m", sign=1), Coefficient("Fv", "N m s/rad", sign=1))
+    shapes = (_RATIO, Shape("power", "1", (), 0.3, 3.0, scales=False))
     forms = ({"power": 2.0}, {"power": 0.5}, {"differential": 1.0})
     simplicity = 17
     rivals = ("viscous", "coulomb")
@@ -120,10 +121,10 @@ class CouplingSpring(_PairEffect):
     """Spring or hose between two joints.
 
     The shape of a nonlinear one contains the coupled coordinate ``x0`` at which it is slack, and
-    ``power`` 3, with coordinates in units of 1 rad or 1 m so that the unit of the stiffness is the
-    same; or a distance from ``x0`` beyond which it stiffens as a hyperbolic sine (``stiffening``)
-    or softens as a hyperbolic tangent (``softening``). A cable or hose that can only pull acts on
-    one ``side`` of ``x0``.
+    a ``power`` of the distance from it, with coordinates in units of 1 rad or 1 m so that the unit
+    of the stiffness is the same; or a distance from ``x0`` beyond which it stiffens as a hyperbolic
+    sine (``stiffening``) or softens as a hyperbolic tangent (``softening``). A cable or hose that
+    can only pull acts on one ``side`` of ``x0``.
     """
 
     kind = "coupling_spring"
@@ -133,6 +134,7 @@ class CouplingSpring(_PairEffect):
     shapes = (
         _RATIO,
         Shape("x0", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
+        Shape("power", "1", (), 1.2, 5.0, scales=False),
         Shape("stiffening", "rad", (), 0.05, 2.0),
         Shape("softening", "rad", (), 0.05, 2.0),
     )
