@@ -211,7 +211,7 @@ class RankingSearch(SearchState):
         itself is tested with its shape refined, as it will be judged later.
         """
         near: dict[frozenset[str], int] = {}
-        for i in np.argsort(-order)[: self.settings.shapes_tested].tolist():
+        for i in map(int, np.argsort(-order)[: self.settings.shapes_tested]):
             candidate = self.pool[i]
             n_rows = int(self.problem.rows.counts[list(candidate.joints)].sum())
             if not drops[i] > self.settings.least_share * n_rows:
