@@ -33,9 +33,7 @@ def motion():
 
 @pytest.fixture(scope="session")
 def spring_log():
-    return make_hidden_effect_log(
-        load_planar_arm(), "spring", joints=[2], n_trajectories=6, duration=6.0
-    )
+    return make_hidden_effect_log(load_planar_arm(), "spring", joints=[2])
 
 
 @pytest.fixture(scope="session")

@@ -49,7 +49,8 @@ def test_recordings_of_two_kinds_are_told_alone(name, change, what, count):
     (one,) = told(frame)
     assert one.check == "divided_recordings" and one.joints == (int(name[-1]),)
     assert what in one.suspicion
-    assert ", ".join(map(str, runs)) in one.suspicion
+    *early, last = map(str, runs)
+    assert f"in trajectories {', '.join(early)} and {last} " in one.suspicion
 
 
 @pytest.mark.parametrize("effect", ["payload", "external_wrench", "environment_contact"])
@@ -76,7 +77,7 @@ def test_a_spring_that_is_missing_does_not_hide_them(factor, what):
     frame.loc[frame["trajectory"] > 3, "tau2"] *= factor
     (one,) = [s for s in check_log(frame, arm).checks if s.certainty != "noted"]
     assert one.check == "divided_recordings" and one.joints == (2,)
-    assert "in trajectories 4, 5 " in one.suspicion and what in one.suspicion
+    assert "in trajectories 4 and 5 " in one.suspicion and what in one.suspicion
 
 
 def test_zeros_of_two_of_many_recordings_are_told_from_those_of_one():
@@ -87,4 +88,4 @@ def test_zeros_of_two_of_many_recordings_are_told_from_those_of_one():
     frame.loc[frame["trajectory"].isin(out), "q2"] += 0.7
     (one,) = [s for s in check_log(frame, arm).checks if s.certainty != "noted"]
     assert one.check == "divided_recordings" and one.joints == (2,)
-    assert "in trajectories 2, 5, 6, 9 the zero" in one.suspicion
+    assert "in trajectories 2, 5, 6 and 9 the zero" in one.suspicion
