@@ -326,7 +326,8 @@ class RankingSearch(SearchState):
             own = [of(group) for group in groups]
             if len(own) < 2:
                 return own
-            gain, i, j = self.tester([*self.chosen, *own]).least_difference([c.width for c in own])
+            tester = self.tester([*self.chosen, *own])
+            gain, i, j = tester.least_difference(len(own), candidate.width)
             if gain > 2 * self._price(own) * candidate.width:
                 return own
             both = tuple(sorted(groups[i] + groups[j]))

@@ -463,28 +463,27 @@ class Tester:
         least = self._least(scaled, *self._mimic(scaled))
         return least.coefficients, least.drop
 
-    def least_difference(self, widths: Sequence[int]) -> tuple[float, int, int]:
+    def least_difference(self, count: int, width: int) -> tuple[float, int, int]:
         """The two of the last effects of the model whose coefficients differ least.
 
         Parameters
         ----------
-        widths : sequence of int
-            Equal numbers of columns of these effects, in the order in which they were added last.
+        count, width : int
+            Number of these effects, and of columns of each.
 
         Returns
         -------
         difference : float
             Squared error that separate coefficients remove, in units of the remaining noise.
         first, second : int
-            The two effects.
+            Places of the two among these effects.
         """
-        n, k = len(widths), widths[0]
-        own = slice(len(self.inverse) - n * k, None)
-        value = (self.inverse @ self._right)[own].reshape(n, k)
-        spread = self.inverse[own, own].reshape(n, k, n, k)
+        own = slice(len(self.inverse) - count * width, None)
+        value = (self.inverse @ self._right)[own].reshape(count, width)
+        spread = self.inverse[own, own].reshape(count, width, count, width)
         mean = sum(float(r @ r) for r in self.residual) / self._free
         found = []
-        for i, j in combinations(range(n), 2):
+        for i, j in combinations(range(count), 2):
             d = value[i] - value[j]
             variance = spread[i, :, i] + spread[j, :, j] - spread[i, :, j] - spread[j, :, i]
             found.append((float(d @ np.linalg.lstsq(variance, d, rcond=None)[0]) / mean, i, j))

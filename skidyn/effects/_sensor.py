@@ -101,7 +101,8 @@ class Saturation(Effect):
     """The logged or delivered torque is cut off at a limit.
 
     With ``rounding`` in its shape the torque approaches the limit smoothly, as a hyperbolic tangent
-    if ``rounding`` is 1. With a ``side`` only positive (1) or negative torque (-1) is cut off.
+    if ``rounding`` is 1. With a ``side`` only positive (1) or negative torque (-1) is cut off. The
+    ``share`` of the torque beyond the limit that is cut off is at least 0.3.
     """
 
     kind = "saturation"
