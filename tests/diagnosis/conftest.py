@@ -42,9 +42,14 @@ def missing(spring_log):
 
 
 @pytest.fixture(scope="session")
-def complete():
-    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=6, duration=6.0)
-    return diagnose(RBDRegressor(log.robot), log.X, log.y)
+def plain_log():
+    """A log in which nothing is hidden."""
+    return make_hidden_effect_log(load_planar_arm(), None, n_trajectories=6, duration=6.0)
+
+
+@pytest.fixture(scope="session")
+def complete(plain_log):
+    return diagnose(RBDRegressor(plain_log.robot), plain_log.X, plain_log.y)
 
 
 @pytest.fixture(scope="session")
