@@ -45,6 +45,8 @@ class JudgingSearch(RankingSearch):
                 or rival.n_parameters > part.n_parameters
                 or simplicity_of(rival) >= simplicity_of(part)
                 or self.denied(rival, best)
+                # Equal recordings on several joints were chosen; one change of the log was not.
+                or (len(rival.candidates) > 1 and in_part(rival) and not within_recordings(best))
             ):
                 continue
             errors, own = part.errors, rival.errors

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn._text import joints_told, listed
-from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._confidence import confidence, mostly_stays
 from skidyn.diagnosis._constancy import Change, changes
@@ -31,8 +30,8 @@ from skidyn.diagnosis._findings import (
     rivals_of,
 )
 from skidyn.diagnosis._floor import predictable_share
-from skidyn.diagnosis._held_out import folds_alone, held_out_residual
-from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, SearchResult
+from skidyn.diagnosis._held_out import held_out_residual
+from skidyn.diagnosis._hypothesis import UNKNOWN, SearchResult, found_terms, on_samples
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._limits import Limit
 from skidyn.diagnosis._noise import sensor_noise
@@ -49,14 +48,12 @@ from skidyn.diagnosis._rule import (
     EPISODE_LEAST_HELD,
     EPISODE_LEAST_NOISE,
     EPISODE_LEAST_RANGE,
-    GUESS,
-    LITTLE,
     MUCH,
-    SURE_OF_LITTLE,
     false_discovery_rate,
 )
 from skidyn.diagnosis._search_state import replace_torque
 from skidyn.diagnosis._unknown import UnknownTorque, describe_unknowns
+from skidyn.diagnosis._withdrawal import drop_of, guess, slight, to_withdraw, without
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 
@@ -101,19 +98,17 @@ def conclude(
         comparisons, history, averages, residual, own_torque = _steps(
             problem, result, torque, sliding
         )
-        terms = [*problem.terms, *_found_terms(problem, result.findings)]
+        terms = [*problem.terms, *found_terms(problem, result.findings)]
         fixed = parameter_intervals(problem, terms, result.fit.noise, shapes=False)
         errors = [
             [_mean_error(c), entry["rmse"], average]
             for c, entry, average in zip(comparisons, history, averages, strict=True)
         ]
         noise = sensor_noise(problem.signals, residual), position_noise(problem, result.fit)
-        useless = _useless(problem, result, errors, noise, least_drop)
-        useless = useless or _vague(problem, result.findings, fixed)
-        useless = useless or _impossible(result.findings, fixed)
-        if useless is None:
+        wrong = to_withdraw(problem, result, errors, noise, least_drop, fixed)
+        if wrong is None:
             break
-        result = _without(problem, result, *useless)
+        result = without(problem, result, *wrong)
     intervals = parameter_intervals(problem, terms, result.fit.noise)
     shown, remarks = [entry["rmse"] for entry in history], list(notes)
     if not is_physics(model):
@@ -121,15 +116,15 @@ def conclude(
         remarks.append(remark)
     rivals = {h.kind: rivals_of(h) for h in result.findings}
     unknowns = _unknowns(problem, result, terms)
-    slight = _slight(problem, result.findings, intervals)
-    remarks += slight.values()
+    unlisted = slight(problem, result.findings, intervals)
+    remarks += unlisted.values()
     findings = []
     for i, hypothesis in enumerate(result.findings):
-        if i in slight:
+        if i in unlisted:
             continue
         others = rivals.get(hypothesis.kind, ())
         for candidate, chance in zip(hypothesis.candidates, hypothesis.chances, strict=True):
-            drop = _drop(shown[i], shown[i + 1], tuple(candidate.rows))
+            drop = drop_of(shown[i], shown[i + 1], tuple(candidate.rows))
             joints = [j + 1 for j in candidate.joints]
             own = [u for u in unknowns if hypothesis.kind == UNKNOWN and u.joint in joints]
             q = false_discovery_rate(chance, hypothesis.tried)
@@ -181,14 +176,14 @@ def conclude(
         unknowns,
         parts=parts,
     )
-    guess = _guess(diagnosis)
-    if guess is None:
+    wrong = guess(diagnosis)
+    if wrong is None:
         return diagnosis
-    rest = _without(problem, result, *guess)
-    without = conclude(problem, rest, limits, sliding, torque, notes, least_drop, model, data)
+    rest = without(problem, result, *wrong)
+    other = conclude(problem, rest, limits, sliding, torque, notes, least_drop, model, data)
     # "Nothing is missing" would be wrong: something is, and this is the most likely name.
-    only = len(result.findings) == 1 and without.verdict == "complete"
-    return diagnosis if only and max(f.error_drop for f in findings) > MUCH else without
+    only = len(result.findings) == 1 and other.verdict == "complete"
+    return diagnosis if only and max(f.error_drop for f in findings) > MUCH else other
 
 
 def _refitted(
@@ -201,7 +196,7 @@ def _refitted(
         "model on this log, and the robot need not have them. "
     )
     found = result.findings
-    steps = [_found_terms(problem, found[:k]) for k in range(len(found) + 1)]
+    steps = [found_terms(problem, found[:k]) for k in range(len(found) + 1)]
     again = refitted_errors(model, problem.robot, steps, *data) if found else None
     if again is None:
         return (
@@ -234,7 +229,7 @@ def _steps(
     comparisons, history, averages = [], [], []
     dry = [t for t in problem.terms if t.is_dry]
     for k in track(range(len(result.findings) + 1), "Judging what was found"):
-        found = _found_terms(problem, result.findings[:k])
+        found = found_terms(problem, result.findings[:k])
         keep = [*dry, *(found if k == len(result.findings) else ())]
         residual, own = _held_out(problem, [*problem.terms, *found], result, keep)
         comparison = _comparison(problem, torque, residual, sliding, [own[t] for t in dry])
@@ -249,185 +244,11 @@ def _steps(
     return comparisons, history, averages, residual, {t: own[t] for t in found}
 
 
-def _found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]:
-    """Terms of findings, each once, without those of the given model."""
-    terms = dict.fromkeys(c.term for h in findings for c in h.candidates)
-    return [t for t in terms if t not in problem.terms]
-
-
-def _useless(
-    problem: Problem,
-    result: SearchResult,
-    errors: Sequence[Sequence[Sequence[float]]],
-    noise: tuple[Array, Array],
-    least: float,
-) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The last finding with terms that do not reduce the error of samples, and these terms.
-
-    They reduced the error of averaged rows. The squared error, which few samples may dominate, and
-    the mean absolute one are both used; terms that do not lower the squared error at all are
-    included. Terms of some recordings need to remove less, by the share of samples of these.
-
-    Where the noise of positions exceeds that of the torque, it dominates the error of samples, and
-    changes with the inertia of the model: there the held-out error of averaged rows counts.
-    """
-    sensor, position = noise
-    coarse = position > np.nan_to_num(sensor)
-    for k in reversed(range(len(result.findings))):
-        terms = []
-        for candidate in result.findings[k].candidates:
-            # A compliant link moves everything that it carries: other joints may be affected more.
-            joints = tuple(candidate.rows)
-            absolute, squared, averaged = (
-                _drop(a, b, joints) for a, b in zip(errors[k], errors[k + 1], strict=True)
-            )
-            if all(coarse[j] for j in joints):
-                absolute = squared = averaged
-            share = _share_of_samples(problem, candidate.term.trajectories)
-            if (absolute + squared) / 2 < least * share or squared <= 0:
-                terms.append(candidate)
-        if terms:
-            return result.findings[k], terms
-    return None
-
-
-def _share_of_samples(problem: Problem, trajectories: tuple[int, ...] | None) -> float:
-    """Share of the samples that belong to some trajectories."""
-    if trajectories is None:
-        return 1.0
-    return float(np.isin(problem.signals.trajectory, trajectories).mean())
-
-
-def _vague(
-    problem: Problem, findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
-) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The last finding with terms whose coefficient is zero within its jackknife interval."""
-    for hypothesis in reversed(findings):
-        if hypothesis.kind == UNKNOWN or hypothesis.torque is not None:
-            continue  # a line is judged on samples; averaged rows may not contain it
-        terms = []
-        for candidate in hypothesis.candidates:
-            if folds_alone(problem, candidate.term).any():
-                continue  # without the fold that determines it, its value is arbitrary
-            effect = candidate.term.effect
-            sizes = [c for c in effect.coefficients if not c.is_zero]
-            if len(sizes) > 1:
-                continue  # each of them may be zero given the others, but not all together
-            others = {s.name for s in effect.shapes}
-            found = [
-                value
-                for name, value in intervals[candidate.term].items()
-                if name not in others and isinstance(value, tuple)
-            ]
-            if found and all(low <= 0 <= high for _, low, high in found):
-                terms.append(candidate)
-        if terms:
-            return hypothesis, terms
-    return None
-
-
-def _impossible(
-    findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
-) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The last finding with terms whose coefficients are physically impossible given all others.
-
-    A sign that was right when an effect was found may change if a later finding, or an unknown
-    function on the same joint, takes its place.
-    """
-    for hypothesis in reversed(findings):
-        terms = []
-        for candidate in hypothesis.candidates:
-            told = intervals[candidate.term]
-            values = [told.get(c.name) for c in candidate.term.coefficients]
-            found = [v[0] for v in values if isinstance(v, tuple)]
-            if len(found) == len(values) and not candidate.allows(np.array(found)):
-                terms.append(candidate)
-        if terms:
-            return hypothesis, terms
-    return None
-
-
-def _slight(
-    problem: Problem, findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
-) -> dict[int, str]:
-    """Indices of findings that are too small to be significant for the robot, with remarks.
-
-    They remain in the completed model, with which later effects were found.
-    """
-    remarks = {}
-    for i, hypothesis in enumerate(findings):
-        reasons = []
-        for candidate in hypothesis.candidates:
-            told = intervals[candidate.term]
-            found = {name: v for name, v in told.items() if isinstance(v, tuple)}
-            reasons.append(candidate.term.effect.too_small(found, problem.signals))
-        if reasons and all(reasons):
-            where = joints_told(j + 1 for j in hypothesis.joints)
-            remarks[i] = (
-                f"{get_effect(hypothesis.kind).title} on {where}: {reasons[0]}. It is part of the "
-                "completed model and is not counted as a finding."
-            )
-    return remarks
-
-
-def _guess(diagnosis: Diagnosis) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The last finding with terms that are more likely wrong than right, and these terms.
-
-    If an explanation on other joints is equally good, one of the two is right, and both are
-    reported. A finding that removes most of an error is kept as its best explanation, as is (in
-    :func:`conclude`) one that removes much of it where all else is noise; one that removes very
-    little needs a high confidence. An effect whose times were chosen has to be constant within
-    them: otherwise they only show where the error of another effect is large. One that another
-    formula of another finding would explain has to be likely by itself.
-    """
-
-    def is_sure(finding: Finding) -> bool:
-        if finding.change > CHANGE_SHARE and any(term.spans for term in finding.terms):
-            return False
-        if finding.instead is not None:
-            return finding.confidence is None or finding.confidence >= GUESS
-        likely = (finding.confidence or 1.0) * (2 if finding.alike else 1)
-        likely *= 1 + len(finding.elsewhere)
-        drop = max(f.error_drop for f in diagnosis.findings if f.kind == finding.kind)
-        little = LITTLE * _share_of_samples(diagnosis.problem, finding.trajectories)
-        if drop < little and likely < SURE_OF_LITTLE:
-            return False
-        return max(likely, finding.error_drop) >= GUESS
-
-    sure = {term: is_sure(f) for f in diagnosis.findings for term in f.terms}
-    for hypothesis in reversed(diagnosis.result.findings):
-        terms = [c for c in hypothesis.candidates if not sure.get(c.term, True)]
-        if terms:
-            return hypothesis, terms
-    return None
-
-
 def _mean_error(comparison: Comparison) -> list[float]:
     """Mean absolute error of every joint on the samples judged, N m or N."""
     use = comparison.sliding if comparison.judged is None else comparison.judged
     total = np.where(use, np.abs(comparison.residual), 0.0).sum(0)
     return [float(x) for x in total / np.maximum(use.sum(0), 1)]
-
-
-def _without(
-    problem: Problem, result: SearchResult, wrong: Hypothesis, terms: Sequence[Candidate]
-) -> SearchResult:
-    """The result with terms of a finding removed and the rest fitted again."""
-    pairs = zip(wrong.candidates, wrong.chances, strict=True)
-    kept = [(c, p) for c, p in pairs if c not in terms]
-    rest = replace(wrong, candidates=tuple(c for c, _ in kept), chances=tuple(p for _, p in kept))
-    ripple = result.ripple
-    if wrong.torque is not None:
-        torque = wrong.torque.copy()
-        torque[:, [j for c in terms for j in c.joints]] = 0.0
-        ripple = ripple - wrong.torque + torque
-        rest = replace(rest, torque=torque)
-    findings = [rest if h is wrong else h for h in result.findings if h is not wrong or kept]
-    known = [t for t in _found_terms(problem, findings) if not _on_samples(t)]
-    bare = replace_torque(problem, problem.torque - ripple)
-    fit = bare.fit((*problem.terms, *known), sigma=result.fit.noise)
-    doubted = (*result.doubted, *(c.term for c in terms if wrong.torque is None))
-    return replace(result, findings=findings, fit=fit, ripple=ripple, doubted=doubted)
 
 
 def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> list[UnknownTorque]:
@@ -441,7 +262,7 @@ def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> 
     ]
     if not nameless:
         return []
-    rest = [t for t in terms if not _on_samples(t)]
+    rest = [t for t in terms if not on_samples(t)]
     bare = replace_torque(problem, problem.torque - result.ripple)
     return describe_unknowns(bare, rest, nameless, result.fit.noise)
 
@@ -450,8 +271,8 @@ def _held_out(
     problem: Problem, terms: Sequence[Term], result: SearchResult, keep: Sequence[Term]
 ) -> tuple[Array, dict[Term, dict[int, Array]]]:
     """Held-out residual; a line's coefficients come from the residual at the full rate."""
-    waves = [t for t in terms if _on_samples(t)]
-    rest = [t for t in terms if not _on_samples(t)]
+    waves = [t for t in terms if on_samples(t)]
+    rest = [t for t in terms if not on_samples(t)]
     if not waves:
         return held_out_residual(problem, rest, result.fit.sigma, keep)
     torque = problem.torque - result.ripple
@@ -463,11 +284,6 @@ def _held_out(
         for t in (c.term for c in hypothesis.candidates if c.term in waves):
             held[t] = {t.places[0]: hypothesis.torque[:, t.places[0]]}
     return residual, held
-
-
-def _on_samples(term: Term) -> bool:
-    """Whether a term is a line in a spectrum, which averaged rows do not contain."""
-    return term.effect.search == "spectrum"
 
 
 def _comparison(
@@ -498,14 +314,6 @@ def _comparison(
 def _entry(comparison: Comparison, added: str | None, joints: Sequence[int]) -> dict[str, Any]:
     rmse = [float(x) for x in comparison.rmse(judged=True)]
     return {"added": added, "joints": [j + 1 for j in joints], "rmse": rmse}
-
-
-def _drop(before: Sequence[float], after: Sequence[float], joints: Sequence[int]) -> float:
-    """Share of the squared error removed on the joints of the effect, each in its own unit."""
-    pairs = [(before[j], after[j]) for j in joints if before[j] > 0]
-    if not pairs:
-        return 0.0
-    return float(np.mean([1 - (a / b) ** 2 for b, a in pairs]))
 
 
 def _sure(

@@ -12,7 +12,7 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.effects import Term, get_effect
-from skidyn.evidence import Fit
+from skidyn.evidence import Fit, Problem
 
 UNKNOWN = "unknown"
 
@@ -159,6 +159,17 @@ def within_recordings(hypothesis: Hypothesis) -> bool:
 def terms_on_rows(findings: Sequence[Hypothesis]) -> list[Term]:
     """Terms of findings except lines of a spectrum, which are subtracted at every sample."""
     return [c.term for h in findings if h.torque is None for c in h.candidates]
+
+
+def found_terms(problem: Problem, findings: Sequence[Hypothesis]) -> list[Term]:
+    """Terms of findings, each once, without those of the given model."""
+    terms = dict.fromkeys(c.term for h in findings for c in h.candidates)
+    return [t for t in terms if t not in problem.terms]
+
+
+def on_samples(term: Term) -> bool:
+    """Whether a term is a line in a spectrum, which averaged rows do not contain."""
+    return term.effect.search == "spectrum"
 
 
 def rivals_among(best: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -69,7 +69,7 @@ MASKED, SURE, ROUNDS = 0.3, 1e-9, 3
 CONFINED = 0.8
 
 #: An effect with a lower confidence that removes a smaller share of the error is not a finding,
-#: unless another effect is equally good (``_conclusion.py``; ``confidence.py``).
+#: unless another effect is equally good (``_withdrawal.py``; ``confidence.py``).
 GUESS = 0.5
 #: The only finding, if it removes a larger share and only noise is left, is reported as the most
 #: likely effect even with a lower confidence.

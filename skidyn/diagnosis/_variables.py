@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +100,9 @@ def averaged_signals(problem: Problem, joint: int) -> dict[str, Array]:
     Returns
     -------
     dict of str to ndarray of shape (n_rows,)
-        Positions, velocities and accelerations of all joints, and the joint's own temperature.
+        Positions, velocities and accelerations of all joints, and the joint's own temperature. The
+        latter is left out if it mostly tells recordings apart and these are not held out as a
+        whole: a flexible function of it would be one of the recording.
     """
     s, weights = problem.sampled(problem.rows.step)
     columns = {
@@ -108,11 +111,20 @@ def averaged_signals(problem: Problem, joint: int) -> dict[str, Array]:
         for kind, table in (("q", s.q), ("dq", s.dq), ("ddq", s.ddq))
     }
     if s.temperature is not None:
-        columns[f"temp{joint + 1}"] = s.temperature[:, joint]
+        own_temperature = s.temperature[:, joint]
+        if problem.whole_trajectories or not _tells_apart(own_temperature, s.trajectory):
+            columns[f"temp{joint + 1}"] = own_temperature
     own = weights[joint]
     total = own @ np.ones(s.n_samples)
     averages = own @ np.column_stack(list(columns.values()))
     return dict(zip(columns, averages.T / total, strict=True))
+
+
+def _tells_apart(values: Array, trajectory: NDArray[Any]) -> bool:
+    """Whether most of the variance of a signal is that between trajectories."""
+    number = np.unique(trajectory, return_inverse=True)[1]
+    mean = np.bincount(number, values) / np.bincount(number)
+    return bool(np.mean((values - mean[number]) ** 2) < 0.5 * np.var(values))
 
 
 def row_weights(problem: Problem, joint: int) -> Array:

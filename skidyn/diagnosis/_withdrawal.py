@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Withdrawal of findings: everything that was found is judged again beside all others.
+
+A finding is withdrawn if it does not reduce the error of samples (:func:`to_withdraw`), if its size
+may be zero or cannot be, or if it is more likely wrong than right (:func:`guess`). One that is too
+small to matter stays in the completed model without being listed (:func:`slight`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn._text import joints_told
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._findings import Finding
+from skidyn.diagnosis._held_out import folds_alone
+from skidyn.diagnosis._hypothesis import (
+    UNKNOWN,
+    Hypothesis,
+    SearchResult,
+    found_terms,
+    on_samples,
+)
+from skidyn.diagnosis._result import Diagnosis
+from skidyn.diagnosis._rule import CHANGE_SHARE, GUESS, LITTLE, SURE_OF_LITTLE
+from skidyn.diagnosis._search_state import replace_torque
+from skidyn.effects import Term, get_effect
+from skidyn.evidence import Problem
+
+#: Terms of one finding that are to be withdrawn.
+Withdrawal = tuple[Hypothesis, list[Candidate]]
+
+
+def to_withdraw(
+    problem: Problem,
+    result: SearchResult,
+    errors: Sequence[Sequence[Sequence[float]]],
+    noise: tuple[Array, Array],
+    least: float,
+    intervals: dict[Term, dict[str, Any]],
+) -> Withdrawal | None:
+    """The last finding with terms that are useless, vague or impossible, and these terms.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds on which effects are judged.
+    result : SearchResult
+        Findings and the final fit.
+    errors : sequence of sequence of sequence of float
+        After each number of findings: absolute, squared and averaged error by joint.
+    noise : tuple of ndarray of shape (n_joints,)
+        Noise of the torque sensor and of positions, N m or N.
+    least : float
+        Share of the error of samples that a finding must remove.
+    intervals : dict
+        Parameters of every term, with intervals for fixed shapes.
+    """
+    return (
+        _useless(problem, result, errors, noise, least)
+        or _vague(problem, result.findings, intervals)
+        or _impossible(result.findings, intervals)
+    )
+
+
+def _useless(
+    problem: Problem,
+    result: SearchResult,
+    errors: Sequence[Sequence[Sequence[float]]],
+    noise: tuple[Array, Array],
+    least: float,
+) -> Withdrawal | None:
+    """The last finding with terms that do not reduce the error of samples, and these terms.
+
+    They reduced the error of averaged rows. The squared error, which few samples may dominate, and
+    the mean absolute one are both used; terms that do not lower the squared error at all are
+    included. Terms of some recordings need to remove less, by the share of samples of these.
+
+    Where the noise of positions exceeds that of the torque, it dominates the error of samples, and
+    changes with the inertia of the model: there the held-out error of averaged rows counts.
+    """
+    sensor, position = noise
+    coarse = position > np.nan_to_num(sensor)
+    for k in reversed(range(len(result.findings))):
+        terms = []
+        for candidate in result.findings[k].candidates:
+            # A compliant link moves everything that it carries: other joints may be affected more.
+            joints = tuple(candidate.rows)
+            absolute, squared, averaged = (
+                drop_of(a, b, joints) for a, b in zip(errors[k], errors[k + 1], strict=True)
+            )
+            if all(coarse[j] for j in joints):
+                absolute = squared = averaged
+            share = _share_of_samples(problem, candidate.term.trajectories)
+            if (absolute + squared) / 2 < least * share or squared <= 0:
+                terms.append(candidate)
+        if terms:
+            return result.findings[k], terms
+    return None
+
+
+def _vague(
+    problem: Problem, findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
+) -> Withdrawal | None:
+    """The last finding with terms whose coefficient is zero within its jackknife interval."""
+    for hypothesis in reversed(findings):
+        if hypothesis.kind == UNKNOWN or hypothesis.torque is not None:
+            continue  # a line is judged on samples; averaged rows may not contain it
+        terms = []
+        for candidate in hypothesis.candidates:
+            if folds_alone(problem, candidate.term).any():
+                continue  # without the fold that determines it, its value is arbitrary
+            effect = candidate.term.effect
+            sizes = [c for c in effect.coefficients if not c.is_zero]
+            if len(sizes) > 1:
+                continue  # each of them may be zero given the others, but not all together
+            others = {s.name for s in effect.shapes}
+            found = [
+                value
+                for name, value in intervals[candidate.term].items()
+                if name not in others and isinstance(value, tuple)
+            ]
+            if found and all(low <= 0 <= high for _, low, high in found):
+                terms.append(candidate)
+        if terms:
+            return hypothesis, terms
+    return None
+
+
+def _impossible(
+    findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
+) -> Withdrawal | None:
+    """The last finding with terms whose coefficients are physically impossible given all others.
+
+    A sign that was right when an effect was found may change if a later finding, or an unknown
+    function on the same joint, takes its place.
+    """
+    for hypothesis in reversed(findings):
+        terms = []
+        for candidate in hypothesis.candidates:
+            told = intervals[candidate.term]
+            values = [told.get(c.name) for c in candidate.term.coefficients]
+            found = [v[0] for v in values if isinstance(v, tuple)]
+            if len(found) == len(values) and not candidate.allows(np.array(found)):
+                terms.append(candidate)
+        if terms:
+            return hypothesis, terms
+    return None
+
+
+def slight(
+    problem: Problem, findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
+) -> dict[int, str]:
+    """Indices of findings that are too small to be significant for the robot, with remarks.
+
+    They remain in the completed model, with which later effects were found.
+    """
+    remarks = {}
+    for i, hypothesis in enumerate(findings):
+        reasons = []
+        for candidate in hypothesis.candidates:
+            told = intervals[candidate.term]
+            found = {name: v for name, v in told.items() if isinstance(v, tuple)}
+            reasons.append(candidate.term.effect.too_small(found, problem.signals))
+        if reasons and all(reasons):
+            where = joints_told(j + 1 for j in hypothesis.joints)
+            remarks[i] = (
+                f"{get_effect(hypothesis.kind).title} on {where}: {reasons[0]}. It is part of the "
+                "completed model and is not counted as a finding."
+            )
+    return remarks
+
+
+def guess(diagnosis: Diagnosis) -> Withdrawal | None:
+    """The last finding with terms that are more likely wrong than right, and these terms.
+
+    If an explanation on other joints is equally good, one of the two is right, and both are
+    reported. A finding that removes most of an error is kept as its best explanation, as is (in
+    :func:`conclude`) one that removes much of it where all else is noise; one that removes very
+    little needs a high confidence. An effect whose times were chosen has to be constant within
+    them: otherwise they only show where the error of another effect is large. One that another
+    formula of another finding would explain has to be likely by itself.
+    """
+
+    def is_sure(finding: Finding) -> bool:
+        if finding.change > CHANGE_SHARE and any(term.spans for term in finding.terms):
+            return False
+        if finding.instead is not None:
+            return finding.confidence is None or finding.confidence >= GUESS
+        likely = (finding.confidence or 1.0) * (2 if finding.alike else 1)
+        likely *= 1 + len(finding.elsewhere)
+        drop = max(f.error_drop for f in diagnosis.findings if f.kind == finding.kind)
+        little = LITTLE * _share_of_samples(diagnosis.problem, finding.trajectories)
+        if drop < little and likely < SURE_OF_LITTLE:
+            return False
+        return max(likely, finding.error_drop) >= GUESS
+
+    sure = {term: is_sure(f) for f in diagnosis.findings for term in f.terms}
+    for hypothesis in reversed(diagnosis.result.findings):
+        terms = [c for c in hypothesis.candidates if not sure.get(c.term, True)]
+        if terms:
+            return hypothesis, terms
+    return None
+
+
+def without(
+    problem: Problem, result: SearchResult, wrong: Hypothesis, terms: Sequence[Candidate]
+) -> SearchResult:
+    """The result with terms of a finding removed and the rest fitted again."""
+    pairs = zip(wrong.candidates, wrong.chances, strict=True)
+    kept = [(c, p) for c, p in pairs if c not in terms]
+    rest = replace(wrong, candidates=tuple(c for c, _ in kept), chances=tuple(p for _, p in kept))
+    ripple = result.ripple
+    if wrong.torque is not None:
+        torque = wrong.torque.copy()
+        torque[:, [j for c in terms for j in c.joints]] = 0.0
+        ripple = ripple - wrong.torque + torque
+        rest = replace(rest, torque=torque)
+    findings = [rest if h is wrong else h for h in result.findings if h is not wrong or kept]
+    known = [t for t in found_terms(problem, findings) if not on_samples(t)]
+    bare = replace_torque(problem, problem.torque - ripple)
+    fit = bare.fit((*problem.terms, *known), sigma=result.fit.noise)
+    doubted = (*result.doubted, *(c.term for c in terms if wrong.torque is None))
+    return replace(result, findings=findings, fit=fit, ripple=ripple, doubted=doubted)
+
+
+def _share_of_samples(problem: Problem, trajectories: tuple[int, ...] | None) -> float:
+    """Share of the samples that belong to some trajectories."""
+    if trajectories is None:
+        return 1.0
+    return float(np.isin(problem.signals.trajectory, trajectories).mean())
+
+
+def drop_of(before: Sequence[float], after: Sequence[float], joints: Sequence[int]) -> float:
+    """Share of the squared error removed on the joints of the effect, each in its own unit."""
+    pairs = [(before[j], after[j]) for j in joints if before[j] > 0]
+    if not pairs:
+        return 0.0
+    return float(np.mean([1 - (a / b) ** 2 for b, a in pairs]))
