@@ -39,6 +39,7 @@ CLASSES = frozenset(
         "diagnosis._correction.CorrectedRegressor",
         "diagnosis._effect_search.EffectSearchCV",
         "diagnosis._faded.FadingCorrection",
+        "diagnosis._rule.Settings",
         "dynamics._tree.KinematicTree",
         "effects._term.Term",
         "effects._transformer.FrictionTransformer",

@@ -23,7 +23,7 @@ from sklearn.preprocessing import FunctionTransformer
 import skidyn
 from skidyn.committee import ELMCommittee
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.diagnosis import EffectSearchCV
+from skidyn.diagnosis import EffectSearchCV, Settings
 from skidyn.exceptions import SkidynError
 from skidyn.hybrid import HybridRegressor
 from skidyn.identification import RBDRegressor
@@ -246,8 +246,10 @@ def test_a_model_with_a_function_inside_is_refused_when_it_is_stored(tmp_path):
 
 def test_a_search_is_stored_without_its_diagnosis(tmp_path):
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=4, duration=3.0)
-    search = EffectSearchCV(RBDRegressor(log.robot), effects=("spring",), cv=2)
-    skidyn.load_model(skidyn.save_model(tmp_path / "before.skops", search))
+    settings = Settings(max_findings=2)
+    search = EffectSearchCV(RBDRegressor(log.robot), effects=("spring",), cv=2, settings=settings)
+    again = skidyn.load_model(skidyn.save_model(tmp_path / "before.skops", search))
+    assert again.settings == settings
     search.fit(log.X, log.y)
     again = skidyn.load_model(skidyn.save_model(tmp_path / "m.skops", search))
     np.testing.assert_array_equal(again.predict(log.X), search.predict(log.X))
