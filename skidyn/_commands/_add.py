@@ -76,7 +76,11 @@ def limited_terms(path: str, kind: str, joints: Sequence[int] | None, n_joints: 
         for name in ("spans", "course"):
             if acts.get(name):
                 when[name] = tuple((int(k), *map(float, x)) for k, *x in acts[name])
-        return Term(kind, every if get_effect(kind).scope == "robot" else on, when)
+        effect, stated = get_effect(kind), entry.get("form") or {}
+        form = {name: stated[name] for name in effect.form_names & set(stated)}
+        if not all(isinstance(value, int | float) for value in form.values()):
+            raise ValueError("the form of an effect is given by numbers")
+        return Term(kind, every if effect.scope == "robot" else on, form | when)
 
     terms = read_effects(path, term)
     covered = {joint for found in terms for joint in found.joints}

@@ -20,6 +20,7 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._ranking import RankingSearch
+from skidyn.diagnosis._rule import TAKEN_BACK
 from skidyn.effects import NamelessEffect, get_effect
 
 
@@ -229,6 +230,8 @@ class JudgingSearch(RankingSearch):
             ]
             worst = int(np.argmax(chances))
             if self.significant(chances[worst], candidates[worst]):
+                if not all(self._acts_on_both(c, candidates) for c in candidates):
+                    return None
                 kept = [j for c in candidates for j in c.rows]
                 gain = np.where(np.isin(np.arange(len(hypothesis.gain)), kept), hypothesis.gain, 0)
                 gain = hypothesis.gain if len(candidates) == len(hypothesis.candidates) else gain
@@ -241,6 +244,25 @@ class JudgingSearch(RankingSearch):
                 )
             del candidates[worst]
         return None
+
+    def _acts_on_both(self, candidate: Candidate, together: Sequence[Candidate]) -> bool:
+        """Whether a coupling is not contradicted by one of its two joints.
+
+        What depends on the motion of another joint, but has no reaction on it, is not a coupling:
+        most of the reaction would have to be taken back.
+        """
+        if candidate.kind == UNKNOWN or candidate.term.effect.scope != "pair":
+            return True
+        tester = self.tester([*self.chosen, *(c for c in together if c is not candidate)])
+        size, _ = tester.estimate(candidate.rows)
+        beside = tester.beside([candidate.rows])
+        for joint, columns in candidate.rows.items():
+            own = {joint: columns}
+            torque, change = columns @ size, columns @ beside.estimate(own)[0]
+            taken_back = torque @ change < -TAKEN_BACK * (torque @ torque)
+            if taken_back and self.significant(beside.test(own).chance, candidate):
+                return False
+        return True
 
     def _judged_together(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """Terms that differ between recordings: significant together, and each alone at 5 %.

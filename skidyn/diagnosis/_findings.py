@@ -139,6 +139,7 @@ class Finding:
             "instead": self.instead,
             "trajectories": None if self.trajectories is None else list(self.trajectories),
             "acts": (self.terms[0].when or None) if self.terms else None,
+            "form": (self.terms[0].form or None) if self.terms else None,
             "when": [episode.to_dict() for episode in self.when],
             "sentence": self.sentence,
         }
@@ -246,7 +247,7 @@ def pairs_of(pairs: Sequence[Sequence[int]]) -> str:
 
 def _joints(problem: Problem, hypothesis: Hypothesis, candidate: Candidate) -> tuple[int, ...]:
     if hypothesis.kind == "payload":
-        return (problem.n_joints,)
+        return (candidate.term.shape.get("link", problem.n_joints - 1) + 1,)
     return tuple(sorted(j + 1 for j in candidate.joints))
 
 

@@ -64,6 +64,9 @@ NEGLIGIBLE = 0.05
 #: a noise that it mostly caused: unless its p-value is below this, it is tested again with the
 #: remaining noise, found in this many rounds.
 MASKED, SURE, ROUNDS = 0.3, 1e-9, 3
+#: Share of the torque of a coupling on one of its joints that must not be taken back there: what
+#: acts on a single joint takes back all of it.
+TAKEN_BACK = 0.5
 #: Share of an effect in one fold above which the others do not determine it: then parts of
 #: recordings are held out instead of whole ones.
 CONFINED = 0.8

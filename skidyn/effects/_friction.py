@@ -132,7 +132,7 @@ class NonlinearViscous(Effect):
     title = "Nonlinear viscous friction"
     formula = r"c\,|\dot q|^p\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("c", "N m (s/rad)^p"),)
-    shapes = (Shape("power", "1", (0.5, 2.0, 3.0), 0.15, 4.5, scales=False, limit_kind="coulomb"),)
+    shapes = (Shape("power", "1", (0.5, 2.0, 3.0), 0.1, 4.5, scales=False, limit_kind="coulomb"),)
     simplicity = 9
     rivals = ("viscous", "stribeck", "coulomb")
     separating_motion = "sweeps that reach the highest speed the joint allows"

@@ -139,6 +139,12 @@ class Term:
         return {k: v for k, v in self.shape.items() if k in _WHEN}
 
     @property
+    def form(self) -> dict[str, Any]:
+        """Entries of the shape that only a further form of the formula has, as Python numbers."""
+        own = {k: v for k, v in self.shape.items() if k in self.effect.form_names}
+        return {k: v.item() if isinstance(v, np.generic) else v for k, v in own.items()}
+
+    @property
     def _own_shape(self) -> dict[str, Any]:
         return {k: v for k, v in self.shape.items() if k not in _WHEN}
 

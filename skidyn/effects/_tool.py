@@ -66,7 +66,7 @@ class _ToolEffect(Effect):
 
 
 class Payload(_ToolEffect):
-    """A rigid body fixed to the last link."""
+    """A rigid body fixed to the last link, or to the ``link`` of another joint, counted from 0."""
 
     kind = "payload"
     is_exact = True
@@ -80,8 +80,10 @@ class Payload(_ToolEffect):
         Coefficient("mcz", "kg m"),
         *(Coefficient(name, "kg m^2") for name in ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")),
     )
+    forms = ({"link": 0},)
     # The inertia of a payload is determined only by many trajectories together.
     leading = 4
+    softness = 1e-4
     grows = True
     simplicity = 27
     caveat = (
@@ -98,10 +100,18 @@ class Payload(_ToolEffect):
         robot = signals.robot
         assert robot is not None
         columns = np.empty((signals.n_joints, signals.n_samples, 10))
+        first = 10 * shape.get("link", len(robot.tree.parents) - 1)
         # Chunk by chunk: the whole regressor of a long log does not fit into memory.
         for rows, chunk in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
-            columns[:, rows] = chunk[:, -10:].transpose(0, 2, 1)
+            columns[:, rows] = chunk[:, first : first + 10].transpose(0, 2, 1)
         return {j: columns[j] for j in joints}
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        assert signals.robot is not None
+        bodies = len(signals.robot.tree.parents)
+        # Bodies that mimic others have no joint of their own.
+        others = range(1, bodies - 1) if bodies == signals.n_joints else ()
+        return [{}, *({"link": link} for link in others)]
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None

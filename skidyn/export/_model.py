@@ -78,13 +78,13 @@ def check_model(model: Any) -> None:
 
 
 def _with_terms(model: RBDRegressor, terms: Sequence[Term]) -> RBDRegressor:
-    """The model with some of its effects, and with a payload as part of the last body."""
+    """The model with some of its effects, and with payloads as parts of their bodies."""
     part = copy.copy(model)
     carried = [t for t in terms if is_carried(t)]
     part.effect_terms_ = [t for t in terms if t not in carried]
     parameters = model.inertial_parameters_.copy()
     for term in carried:
-        parameters[-1] += model.effect_coefficients_[term]
+        parameters[term.shape.get("link", -1)] += model.effect_coefficients_[term]
     part.inertial_parameters_ = parameters
     return part
 
