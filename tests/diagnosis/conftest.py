@@ -71,7 +71,7 @@ def nameless(request):
     variables, formula, size = HIDDEN[request.param]
     return SimpleNamespace(
         log=log,
-        diagnosis=diagnose(RBDRegressor(log.robot), log.X, log.y, checks=()),
+        diagnosis=diagnose(RBDRegressor(log.robot), log.X, log.y),
         variables=variables,
         formula=formula,
         size=log.parameters[size],

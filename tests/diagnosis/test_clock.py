@@ -27,8 +27,7 @@ def test_a_wave_in_time_is_told_with_its_frequency(log, frequency, square):
     torque = np.array(log.y)
     torque[:, 1] += 2 * log.noise_std[1] * (np.sign(wave) if square else np.sqrt(2) * wave)
 
-    # The log is as it should be: only uneven samples, below, are put to its checks.
-    diagnosis = diagnose(RBDRegressor(log.robot), log.X, torque, checks=())
+    diagnosis = diagnose(RBDRegressor(log.robot), log.X, torque)
 
     assert diagnosis.verdict == "unknown"
     first = diagnosis.findings[0]

@@ -31,7 +31,7 @@ def test_slow_remainder_below_twice_the_noise_is_told(log, wandering):
     torque = log.y.copy()
     torque[:, 1] += 1.4 * clean.noise[1] * wandering
 
-    found = diagnose(RBDRegressor(log.robot), log.X, torque, checks=())
+    found = diagnose(RBDRegressor(log.robot), log.X, torque)
 
     assert clean.verdict == "complete"
     assert found.rmse_after[1] < 2 * found.noise[1]

@@ -66,7 +66,7 @@ def test_a_ball_screw_is_named_with_its_lead():
     wave = np.sin(2 * np.pi / 0.005 * log.X[f"q{slider + 1}"].to_numpy())
     torque[:, slider] += 0.3 * np.std(torque[:, slider]) * wave
 
-    (found,) = diagnose(RBDRegressor(log.robot), log.X, torque, checks=()).findings
+    (found,) = diagnose(RBDRegressor(log.robot), log.X, torque).findings
 
     assert (found.kind, found.joints) == ("torque_ripple", (slider + 1,))
     assert found.parameters["N"]["value"] == pytest.approx(2 * np.pi / 0.005, rel=0.01)

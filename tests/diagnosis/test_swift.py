@@ -50,7 +50,7 @@ def test_rounded_positions_are_no_play():
         X[f"q{j + 1}"] = np.round(X[f"q{j + 1}"] / step) * step
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        diagnosis = diagnose(RBDRegressor(robot), X, log.y, checks=())
+        diagnosis = diagnose(RBDRegressor(robot), X, log.y)
 
     assert diagnosis.verdict == "complete"
 
