@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Settings and fixtures of the whole test suite."""
 
+import hashlib
 import os
+import pickle
 import shutil
 import sys
 from pathlib import Path
@@ -106,14 +108,21 @@ def diagnosed_once():
 
 
 @pytest.fixture(scope="session")
-def servo_log():
+def servo_log(tmp_path_factory):
     """Makes the log of a planar arm behind servos, by the coefficients of what it hides."""
-    made = {}
+    folder, made = tmp_path_factory.getbasetemp(), {}
+    if "PYTEST_XDIST_WORKER" in os.environ:  # what one worker has made is read by the others
+        folder = folder.parent
 
     def make(terms, **untold):
         key = repr((list(terms.items()), untold))  # a simulation takes seconds
         if key not in made:
-            made[key] = _servo_log(terms, **untold)
+            file = folder / f"servo_log_{hashlib.sha256(key.encode()).hexdigest()}.pickle"
+            if not file.exists():
+                new = tmp_path_factory.mktemp("servo_log") / file.name
+                new.write_bytes(pickle.dumps(_servo_log(terms, **untold)))
+                os.replace(new, file)  # no worker reads half of it
+            made[key] = pickle.loads(file.read_bytes())
         servo = made[key]
         return SimpleNamespace(**vars(servo) | {"log": servo.log.copy()})
 

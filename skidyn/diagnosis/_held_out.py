@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.diagnosis._rule import CONFINED
+from skidyn.diagnosis._rule import CONFINED, NEW_SHARE
 from skidyn.effects import Term, TermSum
 from skidyn.evidence import Problem, left_out_coefficients
 
@@ -44,7 +44,9 @@ def held_out_residual(
         sigma,
         problem.target,
         soft=problem.soft(terms),
-        kept=lambda grams: told_alone(grams, [t.width for t in terms]),
+        kept=lambda grams: told_alone(
+            grams, [t.width for t in terms], [t.trajectories is not None for t in terms]
+        ),
     )
     fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
     prediction = np.zeros_like(problem.torque)
@@ -87,11 +89,15 @@ def folds_alone(problem: Problem, term: Term) -> NDArray[np.bool_]:
     return shares_of_folds(problem, problem.term_rows(term)) > CONFINED
 
 
-def told_alone(grams: Array, widths: Sequence[int]) -> NDArray[np.bool_]:
+def told_alone(
+    grams: Array, widths: Sequence[int], in_some: Sequence[bool] = ()
+) -> NDArray[np.bool_]:
     """Coefficients that the held-out fold determines nearly alone, (n_folds, n_coefficients).
 
     A coefficient that only one fold determines is not held out with it, because the other folds
-    would give it an arbitrary value.
+    would give it an arbitrary value. Of an effect that acts in some recordings, this holds as soon
+    as any combination of its coefficients is determined by one of them: the inertia of a payload of
+    two recordings, for example.
 
     Parameters
     ----------
@@ -99,16 +105,33 @@ def told_alone(grams: Array, widths: Sequence[int]) -> NDArray[np.bool_]:
         Products of the columns of every fold.
     widths : sequence of int
         Numbers of columns of the effects, which come after those of the bodies.
+    in_some : sequence of bool, default=()
+        Whether each effect acts in some recordings only and is held out with whole recordings;
+        none by default.
     """
     squares = np.diagonal(grams, axis1=1, axis2=2)
     alone = np.zeros(squares.shape, dtype=bool)
     end = squares.shape[1]
-    for width in reversed(widths):
+    some_of = in_some or [False] * len(widths)
+    for width, some in zip(reversed(widths), reversed(some_of), strict=True):
         own = slice(end - width, end)
         energy = squares[:, own].sum(1)
-        alone[:, own] = (energy > CONFINED * energy.sum())[:, None]
+        share = energy / max(float(energy.sum()), 1e-300)
+        if some and width > 1:
+            share = _largest_shares(grams[:, own, own])
+        alone[:, own] = (share > CONFINED)[:, None]
         end -= width
     return alone
+
+
+def _largest_shares(grams: Array) -> Array:
+    """Largest share of each fold in the squares of any combination of some columns, (n_folds,)."""
+    whole = grams.sum(0)
+    size = np.sqrt(np.maximum(np.diagonal(whole), 1e-300))
+    values, vectors = np.linalg.eigh(whole / size[:, None] / size)
+    told = values > NEW_SHARE * values[-1]
+    basis = vectors[:, told] / np.sqrt(values[told]) / size[:, None]
+    return np.linalg.eigvalsh(basis.T @ grams @ basis)[:, -1]
 
 
 def shares_of_folds(problem: Problem, rows: Mapping[int, Array]) -> Array:

@@ -83,7 +83,6 @@ class Payload(_ToolEffect):
     forms = ({"link": 0},)
     # The inertia of a payload is determined only by many trajectories together.
     leading = 4
-    softness = 1e-4
     grows = True
     simplicity = 27
     caveat = (

@@ -69,6 +69,19 @@ def test_joints_on_which_a_report_has_no_limits_are_not_left_out(loaded, run):
     assert {tuple(e["joints"]) for e in added if e["kind"] == "offset"} == {(1,), (2,)}
 
 
+def test_the_form_in_which_an_effect_was_found_is_added(loaded, run):
+    content = json.loads((loaded / "report.json").read_text("utf-8"))
+    content["effects"][0]["form"] = {"link": 0}
+    (loaded / "first.json").write_text(json.dumps(content), encoding="utf-8")
+    out = loaded / "first_link.json"
+
+    code, _ = run("add", "--from", loaded / "first.json", "--effect", "payload", "--out", out)
+
+    assert code == cli.DONE
+    added = json.loads(out.read_text("utf-8"))["effects"]
+    assert [e["shape"]["link"] for e in added if e["kind"] == "payload"] == [0]
+
+
 def test_recordings_that_are_no_numbers_are_refused(loaded, capsys):
     content = json.loads((loaded / "report.json").read_text("utf-8"))
     content["effects"][0]["acts"] = {"trajectories": ["all"]}

@@ -42,14 +42,14 @@ def missing(spring_log):
 
 
 @pytest.fixture(scope="session")
-def plain_log():
+def complete_log():
     """A log in which nothing is hidden."""
     return make_hidden_effect_log(load_planar_arm(), None, n_trajectories=6, duration=6.0)
 
 
 @pytest.fixture(scope="session")
-def complete(plain_log):
-    return diagnose(RBDRegressor(plain_log.robot), plain_log.X, plain_log.y)
+def complete(complete_log):
+    return diagnose(RBDRegressor(complete_log.robot), complete_log.X, complete_log.y)
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_planar_arm, load_scara, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_scara, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
@@ -47,8 +47,22 @@ def test_a_coupling_that_bodies_make_the_same_on_another_pair_of_joints_names_bo
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        (finding,) = diagnose(model, log.X, log.y).findings
+        (finding,) = diagnose(model, log.X, log.y, checks=()).findings
 
     assert {finding.joints, *finding.elsewhere} == {(1, 4), (2, 4)}
     assert finding.confidence < 0.5
     assert "equally well on joints 2 and 4" in finding.sentence
+
+
+def test_what_depends_on_another_joint_without_a_reaction_is_no_coupling():
+    log = make_hidden_effect_log(
+        load_ur5(), None, noise="low", n_trajectories=8, duration=5.0, random_state=2
+    )
+    X, torque = log.X, log.y.copy()
+    change = X["ddq2"] / X["ddq2"].std()
+    torque[:, 4] += 0.5 * torque[:, 4].std() * change
+
+    diagnosis = diagnose(RBDRegressor(log.robot), X, torque, effects=["coupled_inertia"], checks=())
+
+    assert not [f for f in diagnosis.findings if f.kind == "coupled_inertia"]
+    assert diagnosis.verdict == "unknown"

@@ -7,7 +7,6 @@ import json
 import re
 import sys
 import warnings
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -275,7 +274,7 @@ def test_a_completed_model_is_complete(load, kind):
     first = diagnose(model, log.X, log.y)
     assert [(f.kind, f.joints) for f in first.findings] == [(kind, (2,))]
     completed = model.with_effects(first.findings[0].terms)
-    second = diagnose(completed, log.X, log.y)
+    second = diagnose(completed, log.X, log.y, checks=first.checks)
     assert second.verdict == "complete"
     assert second.rmse_before == pytest.approx(first.rmse_after, rel=0.1)
     assert Session(completed, log.X, log.y).history[0]["rmse"] is not None
@@ -405,40 +404,35 @@ def turned(frame: pd.DataFrame) -> pd.DataFrame:
     return frame.assign(q1=frame.q1 + TURN, q2=frame.q2 - 2 * TURN)
 
 
-@pytest.mark.filterwarnings("ignore::skidyn.exceptions.LogWarning")
-@pytest.mark.parametrize(
-    "changes", [(later, reordered, turned), (restarted, renumbered), (duplicated,)]
-)
-def test_how_time_trajectories_and_turns_are_counted_changes_nothing(
-    changes: tuple[Callable[[pd.DataFrame], pd.DataFrame], ...], torso_log: Any, unchanged: Any
-) -> None:
-    frame = torso_log.frame
-    for change in changes:
-        frame = change(frame)
-
-    *said, figures = answer(TORSO, frame)
-
-    assert said == list(unchanged[:3])
-    np.testing.assert_allclose(figures, unchanged[3], rtol=1e-5)
-
-
-@pytest.mark.parametrize("factor", [1e-9, 1e9])
-def test_torque_and_inertia_in_another_unit_change_nothing(
-    factor: float, torso_log: Any, unchanged: Any
-) -> None:
+def in_unit(factor: float, text: str, frame: pd.DataFrame) -> tuple[str, pd.DataFrame]:
+    """Robot and log with torque and inertia in another unit."""
     text = re.sub(
-        r'(value|ixx|iyy|izz)="([^"]+)"', lambda m: f'{m[1]}="{float(m[2]) * factor!r}"', TORSO
+        r'(value|ixx|iyy|izz)="([^"]+)"', lambda m: f'{m[1]}="{float(m[2]) * factor!r}"', text
     )
-    frame = torso_log.frame.copy()
-    frame[["tau1", "tau2", "tau3"]] *= factor
+    return text, frame.assign(**{tau: frame[tau] * factor for tau in ("tau1", "tau2", "tau3")})
 
-    verdict, kind, joints, figures = answer(text, frame)
 
-    assert (verdict, kind, joints) == unchanged[:3]
-    # dF with its interval, errors and noise are torques; vs and delta are none.
+def in_newton_meters(figures: np.ndarray, factor: float) -> np.ndarray:
+    """Figures of a diagnosis in another unit: dF with its interval, errors and noise are torques.
+
+    vs and delta are none.
+    """
     scale = np.ones(len(figures))
     scale[:3] = scale[9:] = factor
-    np.testing.assert_allclose(figures / scale, unchanged[3], rtol=1e-5)
+    return figures / scale
+
+
+# Changes that should change nothing are made together, since a diagnosis takes seconds.
+@pytest.mark.filterwarnings("ignore::skidyn.exceptions.LogWarning")
+def test_how_time_recordings_turns_and_units_are_counted_changes_nothing(
+    torso_log: Any, unchanged: Any
+) -> None:
+    frame = duplicated(turned(reordered(later(torso_log.frame))))
+
+    *said, figures = answer(*in_unit(1e9, TORSO, frame))
+
+    assert said == list(unchanged[:3])
+    np.testing.assert_allclose(in_newton_meters(figures, 1e9), unchanged[3], rtol=1e-5)
 
 
 def test_trajectories_cut_in_two_give_the_same_finding(torso_log: Any, unchanged: Any) -> None:
@@ -453,38 +447,32 @@ def test_trajectories_cut_in_two_give_the_same_finding(torso_log: Any, unchanged
     np.testing.assert_allclose(figures, unchanged[3], rtol=0.1)
 
 
-def test_names_of_joints_change_nothing(torso_log: Any, unchanged: Any) -> None:
-    text = TORSO.replace("elbow_left", "b").replace("shoulder_left", "c")
-
-    *said, figures = answer(text, torso_log.frame)
-
-    assert said == list(unchanged[:3])
-    np.testing.assert_allclose(figures, unchanged[3], rtol=1e-9)
-
-
-def test_a_joint_that_counts_the_other_way_round_changes_nothing(
+def test_names_and_directions_of_joints_and_numbers_of_recordings_change_nothing(
     torso_log: Any, unchanged: Any
 ) -> None:
     text = TORSO.replace(LEFT[3], LEFT[3].replace("0 1 0", "0 -1 0"))
-    frame = torso_log.frame.copy()
+    text = text.replace("elbow_left", "b").replace("shoulder_left", "c")
+    frame = renumbered(torso_log.frame)
     frame[["q2", "dq2", "tau2"]] *= -1
 
     *said, figures = answer(text, frame)
 
     assert said == list(unchanged[:3])
-    np.testing.assert_allclose(figures, unchanged[3], rtol=1e-5)
+    np.testing.assert_allclose(figures, unchanged[3], rtol=1e-9)
 
 
 def test_the_order_of_branches_changes_nothing_but_the_numbers_of_joints(
     torso_log: Any, unchanged: Any
 ) -> None:
-    text = urdf(RIGHT, LEFT)
+    """Also in a small unit, with times that start anew in every recording."""
+    text, frame = in_unit(1e-9, urdf(RIGHT, LEFT), restarted(torso_log.frame))
     names = {f"{c}{old}": f"{c}{new}" for c in ("q", "dq", "tau") for old, new in ORDER.items()}
-    frame = torso_log.frame.rename(columns=names)
+    frame = frame.rename(columns=names)
 
     verdict, kind, joints, figures = answer(text, frame[list(torso_log.frame)])
 
     assert (verdict, kind, joints) == (*unchanged[:2], (3,))
     expected = unchanged[3].copy()
     errors = expected[9:].reshape(3, 3)[:, [2, 0, 1]]
-    np.testing.assert_allclose(figures, [*expected[:9], *errors.ravel()], rtol=1e-5)
+    expected = [*expected[:9], *errors.ravel()]
+    np.testing.assert_allclose(in_newton_meters(figures, 1e-9), expected, rtol=1e-5)

@@ -27,7 +27,7 @@ def wandering(log):
 
 
 def test_slow_remainder_below_twice_the_noise_is_told(log, wandering):
-    clean = diagnose(RBDRegressor(log.robot), log.X, log.y)
+    clean = diagnose(RBDRegressor(log.robot), log.X, log.y, checks=())
     torque = log.y.copy()
     torque[:, 1] += 1.4 * clean.noise[1] * wandering
 
@@ -44,7 +44,9 @@ def test_slow_remainder_of_a_thousandth_of_the_range_is_not_told(log, wandering)
     torque = log.y.copy()
     torque[:, 1] += 0.001 * np.ptp(log.y[:, 1]) * wandering
 
-    assert diagnose(RBDRegressor(log.robot), log.X, torque).verdict == "complete"
+    found = diagnose(RBDRegressor(log.robot), log.X, torque, checks=())
+
+    assert found.verdict == "complete"
 
 
 @pytest.fixture(scope="module")

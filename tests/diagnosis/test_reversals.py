@@ -24,7 +24,7 @@ def diagnosis(log):
     state = dahl_state(log.X["q1"].to_numpy(), rows, presliding=0.004)
     torque = np.array(log.y)
     torque[:, 0] += 2.0 * state
-    return diagnose(RBDRegressor(log.robot), log.X, torque)
+    return diagnose(RBDRegressor(log.robot), log.X, torque, checks=())
 
 
 def test_hysteresis_of_a_short_way_is_found_on_its_joint(diagnosis):
@@ -40,4 +40,6 @@ def test_its_way_is_measured_by_a_model_that_reaches_up_to_the_reversals(diagnos
 
 
 def test_a_joint_that_sticks_at_reversals_is_no_hysteresis(log):
-    assert diagnose(RBDRegressor(log.robot), log.X, log.y).verdict == "complete"
+    found = diagnose(RBDRegressor(log.robot), log.X, log.y, checks=())
+
+    assert found.verdict == "complete"

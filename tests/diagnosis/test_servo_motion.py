@@ -19,7 +19,9 @@ STICTION = ServoFinding("stribeck", 2, {"dF": 0.15}, 0.004, 0.001, "dahl", 0.003
 @pytest.fixture(scope="module")
 def diagnosis():
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=3, duration=4.0)
-    return diagnose(RBDRegressor(log.robot, ("viscous", "coulomb")), log.X, log.y, effects=())
+    return diagnose(
+        RBDRegressor(log.robot, ("viscous", "coulomb")), log.X, log.y, effects=(), checks=()
+    )
 
 
 def test_the_headline_says_what_the_motion_names(diagnosis, monkeypatch):
@@ -54,7 +56,7 @@ def test_a_joint_whose_rotor_was_forgotten_may_still_get_a_name(monkeypatch):
         load_planar_arm(), "rotor_inertia", joints=[2], n_trajectories=3, duration=4.0
     )
     model = RBDRegressor(log.robot, ("viscous", "coulomb"))
-    found = diagnose(model, log.X, log.y, effects=["rotor_inertia"])
+    found = diagnose(model, log.X, log.y, effects=["rotor_inertia"], checks=())
     assert [(f.kind, f.joints) for f in found.findings] == [("rotor_inertia", (2,))]
     asked = []
 

@@ -19,7 +19,7 @@ def diagnosis():
         load_planar_arm(), "spring", joints=[1], n_trajectories=4, duration=4.0, random_state=0
     )
     model = RBDRegressor(log.robot, ("viscous", "coulomb"))
-    found = diagnose(model, log.X, log.y, effects=("spring",))
+    found = diagnose(model, log.X, log.y, effects=("spring",), checks=())
     assert found.simulation is None and found.to_dict()["simulation"] is None
     assert found.story()["simulation"] is None and "simulation" not in found.to_dict()["effects"][0]
     found.judge_by_simulation(horizon=0.5)

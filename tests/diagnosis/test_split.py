@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_panda, load_planar_arm, make_hidden_effect_log
+from skidyn.datasets import load_panda, load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import Settings, diagnose, split_effects
 from skidyn.identification import RBDRegressor
 
@@ -81,3 +81,27 @@ def test_another_load_is_one_of_other_recordings():
     expected = {k: mass for recordings, mass in loads.items() for k in recordings}
     assert carried == pytest.approx(expected, rel=0.05)
     assert {f.trajectories for f in found} == set(loads)
+
+
+def test_a_payload_of_another_link_is_one_and_not_a_zero_of_its_joint():
+    log = make_hidden_effect_log(
+        load_ur5(), None, noise="low", n_trajectories=8, duration=5.0, random_state=1
+    )
+    robot, X = log.robot, log.X
+    heavier = robot.inertial_parameters.copy()
+    mass, center = 1.5, np.array([0.08, 0.0, -0.03])
+    heavier[3, :4] += mass * np.r_[1.0, center]
+    motion = [X[[f"{name}{j + 1}" for j in range(6)]] for name in ("q", "dq", "ddq")]
+    added = robot.inverse_dynamics(*motion, parameters=heavier) - robot.inverse_dynamics(*motion)
+    carries = X["trajectory"].isin([2, 5, 6]).to_numpy()
+
+    diagnosis = diagnose(RBDRegressor(robot), X, log.y + added * carries[:, None])
+
+    (finding,) = diagnosis.findings
+    assert (finding.kind, finding.joints) == ("payload", (4,))
+    assert finding.trajectories == (2, 5, 6)
+    assert finding.to_dict()["form"] == {"link": 3}
+    assert abs(finding.parameters["mass"]["value"] - mass) < 0.1
+    assert not [check for check in diagnosis.checks if check.certainty != "noted"]
+    better = diagnosis.add("payload", joints=[4])
+    assert [term.form for term in better.effect_terms_ if term.kind == "payload"] == [{"link": 3}]

@@ -29,6 +29,17 @@ def test_payload_is_a_heavier_last_link(signals, robot):
         assert not blocks[j][:300].any()
 
 
+def test_a_payload_on_a_link_makes_this_link_heavier(signals, robot):
+    body = np.array([0.7, 0.1, 0.02, -0.05, 0.02, 0.001, 0.0, 0.03, 0.0, 0.04])
+    heavier = robot.inertial_parameters.copy()
+    heavier[0] += body
+    state = signals.q, signals.dq, signals.ddq
+    change = robot.inverse_dynamics(*state, parameters=heavier) - robot.inverse_dynamics(*state)
+    blocks = Term("payload", (1, 2), {"link": 0}).torque_columns(signals)
+    for j in range(2):
+        np.testing.assert_allclose(blocks[j] @ body, change[:, j], atol=1e-10)
+
+
 def test_wrench_works_against_the_motion_of_the_tool(signals, robot):
     force, step = np.array([1.0, -2.0, 0.5]), 1e-6
     blocks = get_effect("external_wrench").torque_columns(signals, (0, 1))

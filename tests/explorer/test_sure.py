@@ -12,8 +12,7 @@ def test_a_name_that_another_effect_beats_is_not_sure(session):
 def test_a_name_far_ahead_of_all_others_is_surer_than_one_among_equals(session):
     session.add("spring", joint=2)
     (sure,) = session.sure()
-    print(sure)
     session.undo()
     session.add("gravity_compensator", joint=2)
     (other,) = session.sure()
-    print(other)
+    assert sure.startswith("confidence ") and other.startswith("low confidence")

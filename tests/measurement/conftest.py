@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A planar arm, its motion and log, and what the checks tell of them."""
 
+from functools import cache
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.effects import Signals
 from skidyn.logs import check_log
 from skidyn.measurement import Measurement, check_measurement
@@ -78,3 +81,22 @@ def only():
 def short(arm):
     """A short log that hides nothing."""
     return make_hidden_effect_log(arm, None, n_trajectories=4, duration=4.0, random_state=3).frame
+
+
+@pytest.fixture(scope="session")
+def checked():
+    """Log of a UR5 with an effect, and its checks, once: those of six joints take seconds."""
+    robot = load_ur5()
+
+    @cache
+    def made(effect, **options):
+        frame = make_hidden_effect_log(robot, effect, **options).frame
+        return SimpleNamespace(robot=robot, frame=frame, checks=check_log(frame, robot).checks)
+
+    return made
+
+
+@pytest.fixture(scope="session")
+def loaded(checked):
+    """A UR5 that carries a load in some recordings."""
+    return checked("payload", n_trajectories=5, duration=6.0, random_state=5)

@@ -40,9 +40,8 @@ def test_play_of_a_gear_is_no_late_motion():
     assert not any(words.startswith("position and velocity") for words in told)
 
 
-def test_a_load_of_some_recordings_does_not_hide_it():
-    log = make_hidden_effect_log(ROBOT, "payload", n_trajectories=5, duration=6.0, random_state=5)
-    told = check_log(late(log.frame, 4, 0.03), ROBOT).checks
+def test_a_load_of_some_recordings_does_not_hide_it(loaded):
+    told = check_log(late(loaded.frame, 4, 0.03), ROBOT).checks
     (told,) = [s for s in told if s.check == "torque_delay"]
     assert told.joints == (4,) and told.remedy.option.startswith("--late q4=0.0")
 

@@ -4,15 +4,8 @@
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 from skidyn.measurement._loads import by_recording, n_loads, span
-
-ROBOT = load_ur5()
-
-
-def told(frame):
-    return [s for s in check_log(frame, ROBOT).checks if s.certainty != "noted"]
 
 
 @pytest.mark.parametrize("count, loads", [(1, 0), (2, 4), (5, 16), (9, 0)])
@@ -31,11 +24,14 @@ def test_columns_that_span_the_same():
     np.testing.assert_allclose(basis @ (basis.T @ columns), columns, atol=1e-9)
 
 
+def test_loads_are_no_mistake(loaded):
+    assert not [s for s in loaded.checks if s.certainty != "noted"]
+
+
 @pytest.mark.parametrize("joint", [3, 5])
-def test_a_zero_is_found_beside_them(joint):
-    log = make_hidden_effect_log(ROBOT, "payload", n_trajectories=5, duration=6.0, random_state=5)
-    assert told(log.frame) == []
-    (one,) = told(log.frame.assign(**{f"q{joint}": log.frame[f"q{joint}"] + 0.9}))
+def test_a_zero_is_found_beside_them(joint, loaded):
+    frame = loaded.frame.assign(**{f"q{joint}": loaded.frame[f"q{joint}"] + 0.9})
+    (one,) = [s for s in check_log(frame, loaded.robot).checks if s.certainty != "noted"]
     assert one.check == "reading" and one.joints == (joint,)
     name, _, angle = one.remedy.option.partition("=")
     assert name == f"--zero q{joint}" and float(angle) == pytest.approx(0.9, abs=0.03)

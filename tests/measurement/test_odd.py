@@ -3,7 +3,7 @@
 
 import pytest
 
-from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.logs import check_log
 
 ROBOT = load_planar_arm()
@@ -47,11 +47,9 @@ def test_the_zero_of_a_joint_in_one_recording():
     assert f"in trajectory {RUN} the zero of joint 2 (joint2) differs by about 3" in told.suspicion
 
 
-def test_a_load_in_half_of_the_recordings_is_no_other_zero():
-    ur5 = load_ur5()
-    options = {"n_trajectories": 6, "duration": 5.0, "random_state": 1}
-    frame = make_hidden_effect_log(ur5, "payload", **options).frame
-    assert "odd_recording" not in {s.check for s in check_log(frame, ur5).checks}
+def test_a_load_in_half_of_the_recordings_is_no_other_zero(checked):
+    log = checked("payload", n_trajectories=6, duration=5.0, random_state=1)
+    assert "odd_recording" not in {s.check for s in log.checks}
 
 
 def test_a_load_of_other_recordings_does_not_hide_the_zero_of_one():

@@ -22,7 +22,7 @@ def log():
 
 @pytest.fixture(scope="module")
 def diagnosis(log):
-    return diagnose(RBDRegressor(log.robot, FRICTION), log.X, log.y)
+    return diagnose(RBDRegressor(log.robot, FRICTION), log.X, log.y, checks=())
 
 
 class Backwards(RBDRegressor):
@@ -94,7 +94,8 @@ def test_findings_of_a_log_of_commands_are_judged_through_the_servo(log):
         + (torque + 4.0 * log.frame[["dq1", "dq2"]].to_numpy()) / 60.0
     )
     X = log.X.assign(cmd1=commands[:, 0], cmd2=commands[:, 1])
-    diagnosis = diagnose(RBDRegressor(log.robot, FRICTION), X, servo_torque(servo, X))
+    model = RBDRegressor(log.robot, FRICTION)
+    diagnosis = diagnose(model, X, servo_torque(servo, X), checks=())
     assert [finding.kind for finding in diagnosis.findings] == ["spring"]
     (verdict,) = diagnosis.judge_by_simulation(controller=servo)
     assert verdict.improves and diagnosis.vetoed == []

@@ -20,6 +20,7 @@ def diagnosis(sticky_servo):
         sticky_servo.log,
         servo_torque(sticky_servo.controller, sticky_servo.log),
         effects=["spring"],
+        checks=(),
     )
     assert found.servo_motion is None and found.to_dict()["servo_motion"] is None
     found.explain_servo_motion(sticky_servo.controller)
