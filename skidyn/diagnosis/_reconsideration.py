@@ -23,7 +23,8 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
-from skidyn.effects import get_effect
+from skidyn.diagnosis._rule import BETWEEN
+from skidyn.effects import Term, get_effect
 
 
 class ReconsideringSearch(JudgingSearch):
@@ -50,12 +51,32 @@ class ReconsideringSearch(JudgingSearch):
                 if is_piece or self.shadow(judged):
                     judged = self._beside_another_kind(judged)
             if judged is not None:
+                judged = self._offset_later(judged)
                 rivals = rivals_among(judged, offered)
                 margin, alike = margin_over(judged, rivals), self._alike(judged, rivals)
                 elsewhere = self._elsewhere(judged)
                 judged = replace(judged, margin=margin, alike=alike, elsewhere=elsewhere)
                 return ranked_with(judged, offered)
         return None
+
+    def _offset_later(self, step: Hypothesis) -> Hypothesis:
+        """A step in time between two recordings, as an offset of the later ones."""
+        signals, kind = self.problem.signals, "offset"
+        if step.kind != UNKNOWN or kind not in self.kinds:
+            return step
+        candidates = []
+        for c in step.candidates:
+            moment = c.term.shape.get("moment")
+            if moment is None:
+                return step
+            names, number = np.unique(signals.trajectory, return_inverse=True)
+            share = np.bincount(number, signals.clock >= moment) / np.bincount(number)
+            if (np.minimum(share, 1 - share) > BETWEEN).any():
+                return step  # within a recording
+            later = tuple(map(int, names[share > BETWEEN]))
+            term = Term.at(kind, c.term.places, {"trajectories": later})
+            candidates.append(Candidate(kind, term, c.rows))
+        return replace(step, kind=kind, candidates=tuple(candidates))
 
     def _first_of_two_names(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
         """An unknown function, or the first of two known effects that together are as good."""

@@ -17,16 +17,15 @@ class TorqueGain(Effect):
     """The logged torque is too large or too small by a factor.
 
     With a ``sign`` in its shape this holds only for positive (1) or negative torque (-1), as for a
-    fault in one half of a bridge or of an amplifier. With ``curved``, the factor changes with the
-    size of the torque, as for a sensor or a current constant that is not linear.
+    fault in one half of a bridge or of an amplifier.
     """
 
     kind = "torque_gain"
     drawn_against = "load"
     title = "Torque gain"
-    formula = r"\varepsilon\,\tau_\mathrm{model} + c\,\tau_\mathrm{model}\,|\tau_\mathrm{model}|"
+    formula = r"\varepsilon\,\tau_\mathrm{model}"
     coefficients = (Coefficient("epsilon", "1"),)
-    forms = ({"sign": 1.0}, {"sign": -1.0}, {"curved": 1.0})
+    forms = ({"sign": 1.0}, {"sign": -1.0})
     needs = ("model_torque",)
     by_recording = True
     drifts = True
@@ -35,14 +34,9 @@ class TorqueGain(Effect):
     separating_motion = "a known payload carried through the same motion"
     reference = "Gautier, Briot (2014), ASME JDSMC 136(5): drive gains from a known payload."
 
-    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
-        return (*self.coefficients, Coefficient("curvature", "1/(N m)"))[: 1 + ("curved" in shape)]
-
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.model_torque is not None
         torque = signals.model_torque[:, [joint]]
-        if "curved" in shape:
-            return np.hstack([torque, torque * np.abs(torque)])
         sign = shape.get("sign")
         return torque if sign is None else sign * np.maximum(0.0, sign * torque)
 

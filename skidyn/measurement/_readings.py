@@ -26,6 +26,8 @@ OVERWHELMING = 100.0
 #: Share of a joint's residual that a zero must take off to be noted beside other bodies, and its
 #: least angle, rad: the direction of a weight in a description is not known better.
 MOSTLY, NOTED = 0.8, np.deg2rad(10)
+#: Angle below which a zero of a last joint may as well be the direction of its centre of mass, rad.
+TURNED = np.deg2rad(30)
 #: Changes of one joint whose gains differ by less than this, or this share, cannot be separated.
 TIED, ALIKE = 3.0, 0.05
 #: Share of the gain within which another kind of change of the same joints is equally possible.
@@ -158,7 +160,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         most = int(np.argmax(fits.nominal(best.reading).margin(here)))
         held = _against_effects(fought(best.reading, best.joints or (most,)), best)
         if held is not None:
-            return held
+            return _or_another_last_body(fits, held)
         accepted.remove(best)
     if reading != Reading():
         return None  # what is read anew already, and bodies, need no other zero
@@ -288,6 +290,20 @@ def _against_effects(duel: Duel, change: Change) -> Change | None:
     if duel.gain < LEAST or max(duel.beside, duel.gain - duel.rival) <= 0:
         return None
     return replace(change, other=duel.effect)
+
+
+def _or_another_last_body(fits: Fits, change: Change) -> Change:
+    """The change, and the body of a last joint in place of a small angle of its zero.
+
+    Both turn the weight that the joint carries, and nothing beyond the joint tells them apart; no
+    description knows the direction of a centre of mass to a few degrees.
+    """
+    parents = fits.robot.tree.parents
+    if change.kind != "zero" or change.other or len(parents) != fits.n_joints:
+        return change
+    angles = dict(change.reading.zero)
+    own = [abs(angles[j]) < TURNED and not np.any(np.equal(parents, j)) for j in change.joints]
+    return replace(change, other=OTHER_BODIES) if all(own) else change
 
 
 def _or_bodies(duel: Duel, zero: Change) -> Change | None:

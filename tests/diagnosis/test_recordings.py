@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.diagnosis._recordings import own_friction
 from skidyn.effects import Signals, make_terms
@@ -53,3 +53,19 @@ def test_friction_of_the_model_may_have_another_level(log):
     kinds = [(c.kind, c.joints) for c in own_friction(problem, ["coulomb", "friction_drift"])]
 
     assert kinds == [(kind, (j,)) for kind in ("coulomb", "friction_drift") for j in (0, 1)]
+
+
+def test_an_offset_from_a_recording_on_is_one_of_the_later_recordings():
+    log = make_hidden_effect_log(
+        load_ur5(), None, noise="low", n_trajectories=8, duration=5.0, random_state=4
+    )
+    torque = log.y.copy()
+    names = sorted(log.X["trajectory"].unique())[3:]
+    later = log.X["trajectory"].isin(names).to_numpy()
+    torque[later, 2] += 0.2 * torque[:, 2].std()
+    torque[later, 5] -= 0.2 * torque[:, 5].std()
+
+    found = diagnose(RBDRegressor(log.robot), log.X, torque, checks=()).findings
+
+    assert {(f.kind, f.joints) for f in found} == {("offset", (3,)), ("offset", (6,))}
+    assert {f.trajectories for f in found} == {tuple(names)}

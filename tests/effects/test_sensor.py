@@ -26,8 +26,6 @@ def test_saturation_and_gain(signals, columns_of):
     np.testing.assert_array_equal(positive, np.maximum(torque, 0))
     negative = columns_of("torque_gain", signals, sign=-1.0)[:, 0]
     np.testing.assert_array_equal(negative, np.minimum(torque, 0))
-    curved = columns_of("torque_gain", signals, curved=1.0)
-    np.testing.assert_array_equal(curved, np.column_stack([torque, torque * np.abs(torque)]))
 
 
 def test_a_rounded_limit_is_approached(signals, columns_of):

@@ -40,6 +40,13 @@ def test_zero_of_a_joint(signals, torque, found):
     assert name == "--zero q2" and float(value) == pytest.approx(1.0, abs=0.02)
 
 
+def test_a_last_body_whose_weight_points_elsewhere_is_no_certain_zero(signals, torque, found):
+    told = found(signals.with_(q=signals.q + [0.0, np.deg2rad(16)]), torque)
+    (reading,) = [s for s in told if s.check == "reading"]
+    assert (reading.certainty, reading.joints) == ("noted", (2,))
+    assert "bodies that differ from the description" in reading.suspicion
+
+
 def test_a_joint_that_counts_the_other_way_from_another_zero(signals, torque, found):
     sign, zero = np.array([1, -1]), np.array([0, np.pi / 2])
     turned = signals.with_(q=zero + sign * signals.q, dq=sign * signals.dq, ddq=sign * signals.ddq)
