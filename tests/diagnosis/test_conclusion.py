@@ -1,14 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a diagnosis says agrees with what it has measured."""
 
-import warnings
-
 import numpy as np
-import pytest
-
-from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.diagnosis import diagnose
-from skidyn.identification import RBDRegressor
 
 
 def test_the_history_is_that_of_both_comparisons(missing):
@@ -27,23 +20,3 @@ def test_a_finding_removes_what_it_says(missing):
 def test_verdicts(missing, complete):
     assert (missing.verdict, missing.unexplained) == ("missing", None)
     assert (complete.verdict, complete.findings) == ("complete", [])
-
-
-@pytest.mark.parametrize(("delay", "is_named"), [(-0.003, False), (0.003, False), (0.012, True)])
-def test_a_delay_within_half_a_sampling_step_is_a_remark_and_no_finding(delay, is_named):
-    """Loggers read the channels of a row one after the other."""
-    log = make_hidden_effect_log(load_planar_arm(), None, noise="low", rate=100.0, random_state=1)
-    torque = log.y.copy()
-    for name in np.unique(log.X["trajectory"]):
-        rows = np.flatnonzero(log.X["trajectory"] == name)
-        clock = log.X["time"].to_numpy()[rows]
-        for joint in range(2):
-            torque[rows, joint] = np.interp(clock - delay, clock, log.y[rows, joint])
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        diagnosis = diagnose(RBDRegressor(log.robot), log.X, torque)
-
-    assert [f.kind for f in diagnosis.findings] == ["time_delay"] * is_named
-    assert any("half of the sampling step" in note for note in diagnosis.warnings) != is_named
-    assert diagnosis.verdict == ("missing" if is_named else "complete")

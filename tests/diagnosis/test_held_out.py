@@ -3,6 +3,8 @@
 
 import numpy as np
 
+from skidyn.diagnosis._held_out import told_alone
+
 
 def test_errors_of_data_left_out_are_no_smaller_than_those_of_the_fit(missing, spring_log):
     inside = np.asarray(spring_log.y) - missing.model.predict(spring_log.X)
@@ -10,3 +12,11 @@ def test_errors_of_data_left_out_are_no_smaller_than_those_of_the_fit(missing, s
     fitted = np.sqrt(np.mean(inside[sliding] ** 2))
     held = np.sqrt(np.mean(missing.comparison_after.residual[sliding] ** 2))
     assert fitted < 1.02 * held < 1.2 * fitted
+
+
+def test_what_one_recording_alone_determines_is_not_held_out_with_it():
+    # recording 0 shows both columns apart, recording 1 only their sum
+    grams = np.array([[[1.0, 0.0], [0.0, 1.0]], [[1.0, 1.0], [1.0, 1.0]]])
+
+    assert not told_alone(grams, [2]).any()
+    np.testing.assert_array_equal(told_alone(grams, [2], [True]), [[True, True], [False, False]])
