@@ -86,11 +86,19 @@ def split_effects(
         free = ~recordings_with(kind, known, names)
         if free.sum() < 2:
             continue
-        for shape in effect.grid(problem.few, joints):
+        usual = effect.grid(problem.few, joints)
+        most = 0.0
+        for shape in [*usual, *effect.elsewhere(problem.few)]:
             term = Term.at(kind, joints, shape)
             rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
             products = _Products.of(problem, model, y, rows, names)
-            found += _best_splits(problem, term, products, names, free)
+            splits = _best_splits(problem, term, products, names, free)
+            if shape in usual:
+                most = max([most, *(float(split.drop.sum()) for split in splits)])
+            else:
+                least = effect.elsewhere_must_gain * most
+                splits = [split for split in splits if float(split.drop.sum()) > least]
+            found += splits
     return found
 
 

@@ -142,6 +142,11 @@ class Effect:
     leading : int
         With ``search="trajectories"``: number of first coefficients that every single trajectory
         determines; all of them if 0.
+    places : tuple of str
+        With ``search="trajectories"``: entries of the shape for other places than the usual one
+        (:meth:`elsewhere`).
+    elsewhere_must_gain : float
+        Multiple of what the effect at its usual place removes that it must remove elsewhere.
     grows : bool
         With ``search="trajectories"``: whether the trajectories with the larger first coefficient
         have the effect, even if they are the majority, as a payload adds mass.
@@ -209,6 +214,8 @@ class Effect:
     needs: ClassVar[tuple[str, ...]] = ()
     automatic: ClassVar[bool] = True
     leading: ClassVar[int] = 0
+    places: ClassVar[tuple[str, ...]] = ()
+    elsewhere_must_gain: ClassVar[float] = 1.0
     grows: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
     drifts: ClassVar[bool] = False
@@ -242,7 +249,7 @@ class Effect:
     @property
     def form_names(self) -> frozenset[str]:
         """Names of shape entries that only further forms of the formula have."""
-        return frozenset(name for form in self.forms for name in form)
+        return frozenset(name for form in self.forms for name in form) | frozenset(self.places)
 
     @property
     def needs_fit(self) -> bool:
@@ -273,6 +280,16 @@ class Effect:
     def on_bodies(self) -> bool:
         """Whether it acts on the bodies of the robot, so that the gears carry its torque."""
         return self.scope == "robot" and not self.needs_fit
+
+    def elsewhere(self, signals: Signals) -> list[dict[str, Any]]:
+        """Shapes of other places at which the effect may act in some of the trajectories.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+        """
+        return []
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
         """Linear coefficients for a given shape, one per column.

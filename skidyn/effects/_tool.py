@@ -80,7 +80,9 @@ class Payload(_ToolEffect):
         Coefficient("mcz", "kg m"),
         *(Coefficient(name, "kg m^2") for name in ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")),
     )
-    forms = ({"link": 0},)
+    places = ("link",)
+    # With bodies that are not exact, a load fits a little better on a link that does not have it.
+    elsewhere_must_gain = 1.5
     # The inertia of a payload is determined only by many trajectories together.
     leading = 4
     grows = True
@@ -105,12 +107,12 @@ class Payload(_ToolEffect):
             columns[:, rows] = chunk[:, first : first + 10].transpose(0, 2, 1)
         return {j: columns[j] for j in joints}
 
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+    def elsewhere(self, signals: Signals) -> list[dict[str, Any]]:
         assert signals.robot is not None
         bodies = len(signals.robot.tree.parents)
         # Bodies that mimic others have no joint of their own.
         others = range(1, bodies - 1) if bodies == signals.n_joints else ()
-        return [{}, *({"link": link} for link in others)]
+        return [{"link": link} for link in others]
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None

@@ -197,8 +197,8 @@ def _shapes(
         if effect.scope != "robot" and any(effect.not_shown(signals, j) for j in site):
             continue
         # a payload or a wrench is tried in all recordings, where other links are other bodies
-        free = effect.search == "grid" or rows is not None
-        grid = effect.grid(signals, site) if free else [{}]
+        grid = effect.grid(signals, site) if effect.search == "grid" else [{}]
+        grid = grid if rows is None else [*grid, *effect.elsewhere(signals)]
         for shape in grid:
             if not effect.admissible(signals, site, shape):
                 continue
