@@ -115,11 +115,12 @@ def told_alone(
     some_of = in_some or [False] * len(widths)
     for width, some in zip(reversed(widths), reversed(some_of), strict=True):
         own = slice(end - width, end)
-        energy = squares[:, own].sum(1)
-        share = energy / max(float(energy.sum()), 1e-300)
-        if some and width > 1:
-            share = _largest_shares(grams[:, own, own])
-        alone[:, own] = (share > CONFINED)[:, None]
+        if some:
+            confined = _largest_shares(grams[:, own, own]) > CONFINED
+        else:
+            energy = squares[:, own].sum(1)
+            confined = energy > CONFINED * energy.sum()
+        alone[:, own] = confined[:, None]
         end -= width
     return alone
 
@@ -130,6 +131,8 @@ def _largest_shares(grams: Array) -> Array:
     size = np.sqrt(np.maximum(np.diagonal(whole), 1e-300))
     values, vectors = np.linalg.eigh(whole / size[:, None] / size)
     told = values > NEW_SHARE * values[-1]
+    if not told.any():
+        return np.zeros(len(grams))  # the effect does not act in these rows
     basis = vectors[:, told] / np.sqrt(values[told]) / size[:, None]
     return np.linalg.eigvalsh(basis.T @ grams @ basis)[:, -1]
 

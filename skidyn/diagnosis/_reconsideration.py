@@ -64,13 +64,13 @@ class ReconsideringSearch(JudgingSearch):
         signals, kind = self.problem.signals, "offset"
         if step.kind != UNKNOWN or kind not in self.kinds:
             return step
+        names, number, rows = np.unique(signals.trajectory, return_inverse=True, return_counts=True)
         candidates = []
         for c in step.candidates:
             moment = c.term.shape.get("moment")
             if moment is None:
                 return step
-            names, number = np.unique(signals.trajectory, return_inverse=True)
-            share = np.bincount(number, signals.clock >= moment) / np.bincount(number)
+            share = np.bincount(number, signals.clock >= moment) / rows
             if (np.minimum(share, 1 - share) > BETWEEN).any():
                 return step  # within a recording
             later = tuple(map(int, names[share > BETWEEN]))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from skidyn._exceptions import EffectError
 from skidyn._signals import Signals
 from skidyn.effects._base import Array, Coefficient, Effect, Shape
 from skidyn.effects._springs import FEWEST_TOUCHING, MOST_TOUCHING
@@ -66,7 +67,10 @@ class _ToolEffect(Effect):
 
 
 class Payload(_ToolEffect):
-    """A rigid body fixed to the last link, or to the ``link`` of another joint, counted from 0."""
+    """A rigid body fixed to the last link.
+
+    With ``link`` in its shape it is fixed to the link that this joint moves, counted from 0.
+    """
 
     kind = "payload"
     is_exact = True
@@ -101,7 +105,14 @@ class Payload(_ToolEffect):
         robot = signals.robot
         assert robot is not None
         columns = np.empty((signals.n_joints, signals.n_samples, 10))
-        first = 10 * shape.get("link", len(robot.tree.parents) - 1)
+        bodies = len(robot.tree.parents)
+        link = shape.get("link", bodies - 1)
+        if link not in range(bodies):
+            raise EffectError(
+                f"payload: link={link!r}; expected a whole number from 0 to {bodies - 1}, that of "
+                "the joint that moves the link, counted from 0"
+            )
+        first = 10 * int(link)
         # Chunk by chunk: the whole regressor of a long log does not fit into memory.
         for rows, chunk in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
             columns[:, rows] = chunk[:, first : first + 10].transpose(0, 2, 1)

@@ -168,7 +168,8 @@ class Session(Seen):
             if self._has(candidate):
                 continue
             best[candidate.kind] = _shown(candidate, float(drop[at]), float(here[at]))
-        for offer in self._offers(j):
+        # of several offers of a kind, such as payloads of two links, the largest is shown
+        for offer in sorted(self._offers(j), key=lambda offer: float(offer.drop[j])):
             share, which = float(offer.drop[j]), offer.candidate.term.trajectories
             inside = trajectory is None or which is None or trajectory in which
             if share >= LEAST_DROP and inside:

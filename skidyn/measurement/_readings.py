@@ -295,8 +295,8 @@ def _against_effects(duel: Duel, change: Change) -> Change | None:
 def _or_another_last_body(fits: Fits, change: Change) -> Change:
     """The change, and the body of a last joint in place of a small angle of its zero.
 
-    Both turn the weight that the joint carries, and nothing beyond the joint tells them apart; no
-    description knows the direction of a centre of mass to a few degrees.
+    Both turn the weight that the joint carries, and nothing beyond the joint separates them, while
+    the centre of mass of a body with its cables and tool is often off by a part of its distance.
     """
     parents = fits.robot.tree.parents
     if change.kind != "zero" or change.other or len(parents) != fits.n_joints:

@@ -82,6 +82,16 @@ def test_the_form_in_which_an_effect_was_found_is_added(loaded, run):
     assert [e["shape"]["link"] for e in added if e["kind"] == "payload"] == [0]
 
 
+@pytest.mark.parametrize("link", [99, 0.5])
+def test_a_link_that_the_robot_lacks_is_refused(loaded, link, capsys):
+    content = json.loads((loaded / "report.json").read_text("utf-8"))
+    content["effects"][0]["form"] = {"link": link}
+    (loaded / "no_link.json").write_text(json.dumps(content), encoding="utf-8")
+    words = ["add", "--from", str(loaded / "no_link.json"), "--effect", "payload"]
+    assert cli.main(words) == cli.BAD_INPUT
+    assert f"link={link}; expected a whole number from 0 to 1" in capsys.readouterr().err
+
+
 def test_recordings_that_are_no_numbers_are_refused(loaded, capsys):
     content = json.loads((loaded / "report.json").read_text("utf-8"))
     content["effects"][0]["acts"] = {"trajectories": ["all"]}

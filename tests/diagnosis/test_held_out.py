@@ -20,3 +20,4 @@ def test_what_one_recording_alone_determines_is_not_held_out_with_it():
 
     assert not told_alone(grams, [2]).any()
     np.testing.assert_array_equal(told_alone(grams, [2], [True]), [[True, True], [False, False]])
+    assert not told_alone(0 * grams, [2], [True]).any()

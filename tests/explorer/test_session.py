@@ -3,11 +3,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from skidyn.datasets import load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import Settings, diagnose
 from skidyn.effects import get_effect
 from skidyn.exceptions import EffectError
+from skidyn.explorer import Session
+from skidyn.identification import RBDRegressor
 
 
 def test_the_missing_effect_is_ranked_first_and_its_addition_lowers_the_error(session):
@@ -119,3 +123,21 @@ def test_an_addition_is_removed_whatever_came_after_it(session):
 def test_nothing_is_offered_where_nothing_helps(session):
     session.add("spring", joint=2)
     assert session.ranked(joint=1) == []
+
+
+def test_of_payloads_of_several_links_the_largest_is_ranked_and_added():
+    log = make_hidden_effect_log(load_ur5(), None, n_trajectories=5, duration=4.0, random_state=1)
+    heavier = log.robot.inertial_parameters.copy()
+    heavier[2, :4] += 3.0 * np.array([1.0, 0.1, 0.0, 0.05])
+    motion = [log.X[[f"{name}{j + 1}" for j in range(6)]] for name in ("q", "dq", "ddq")]
+    change = log.robot.inverse_dynamics(*motion, parameters=heavier)
+    change -= log.robot.inverse_dynamics(*motion)
+    own = log.X["trajectory"].isin([1, 3]).to_numpy()
+    session = Session(RBDRegressor(log.robot), log.X, log.y + change * own[:, None])
+
+    (shown,) = [effect for effect in session.ranked(2) if effect.kind == "payload"]
+    session.add("payload", 2)
+
+    assert shown.trajectories == (1, 3)
+    assert shown.drop > 0.9
+    assert [term.form for term in session.terms if term.kind == "payload"] == [{"link": 2}]
