@@ -288,6 +288,11 @@ class Effect:
         ----------
         signals : Signals
             Motion.
+
+        Returns
+        -------
+        list of dict
+            Shape parameters, one dictionary for each place; none by default.
         """
         return []
 
