@@ -2,7 +2,8 @@
 # what it needs, once. Nothing outside this folder is touched.
 #
 #   make demo   find a hidden effect in a simulated log, add it, write an HTML report
-#   make test   run the tests
+#   make test   run the tests, but for those that are marked slow
+#   make slow   run those: more robots, kinds and formulas, each with a whole diagnosis
 #   make lint   ruff, codespell, mypy and the documentation build with warnings as errors
 #   make docs   build the documentation into docs/_build/html
 #   make wheel  build a wheel into dist/ and check that it holds the whole package
@@ -18,15 +19,16 @@ TORCH ?= torch==2.13.0
 VENV ?= .venv
 PYTEST_ARGS ?=
 # what make compatibility installs into, and runs ("tests" for everything, which takes long): every
-# package that other packages are called by, once. Slow tests are left out, since another version is
-# missed by the first call of what it lacks, and not by the size of a robot or the accuracy of an
-# answer; a diagnosis needs the same of other packages for each kind, and three from MuJoCo remain.
+# package that other packages are called by, once. An older version fails at the first call of what
+# it lacks, and not by the size of a robot or the accuracy of an answer.
 OLDEST ?= .venv-oldest
-CORE_TESTS ?= -m "not slow" $(addprefix tests/,robots dynamics identification effects evidence metrics \
+CORE_TESTS ?= $(addprefix tests/,robots dynamics identification effects evidence metrics \
     model_selection preprocessing neural_network committee fleet)
 
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# --no-compile: Python compiles what is imported, which is a small part of these packages
+PIP_INSTALL := -m pip install --quiet --disable-pip-version-check --no-compile
+PIP := $(BIN)/python $(PIP_INSTALL)
 
 # One thread per process: the tests and the docs build use the cores through processes.
 export OMP_NUM_THREADS ?= 1
@@ -34,7 +36,7 @@ export MKL_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test lint check format docs wheel compatibility clean
+.PHONY: demo test slow lint check format docs wheel compatibility clean
 
 demo: $(VENV)/.demo
 	$(BIN)/python -m skidyn demo
@@ -42,6 +44,9 @@ demo: $(VENV)/.demo
 # worksteal: tests of a file stay together, so that what they share is made once
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_ARGS)
+
+slow: $(VENV)/.test
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow $(PYTEST_ARGS)
 
 # at the same time, after all is installed: mypy works on one core, and docs on two only in part
 lint: $(VENV)/.lint $(VENV)/.docs
@@ -92,11 +97,11 @@ $(OLDEST)/.installed: pyproject.toml setup.cfg .ci/oldest.py $(shell git ls-file
 	rm -rf $(OLDEST)
 	$(PYTHON) -m venv $(OLDEST)
 	@echo "Installing $(TORCH) and the oldest dependencies into $(OLDEST) ..."
-	@$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check "$(TORCH)" build
+	@$(OLDEST)/bin/python $(PIP_INSTALL) "$(TORCH)" build
 	$(OLDEST)/bin/python -m build --outdir $(OLDEST)/dist .
 	$(OLDEST)/bin/python .ci/check_wheel.py $(OLDEST)/dist/skidyn-*.whl
 	$(OLDEST)/bin/python .ci/oldest.py test > $(OLDEST)/constraints.txt
-	@$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check \
+	@$(OLDEST)/bin/python $(PIP_INSTALL) \
 	    -c $(OLDEST)/constraints.txt pytest pytest-xdist hypothesis polars \
 	    "skidyn[all] @ file://$$(ls $(abspath $(OLDEST))/dist/skidyn-*.whl)"
 	@touch $@

@@ -82,7 +82,7 @@ def judge_additions(
     >>> from skidyn.identification import RBDRegressor
     >>> from skidyn.simulation import judge_additions
     >>> log = make_hidden_effect_log(
-    ...     load_planar_arm(), "spring", joints=[1], n_trajectories=4, duration=4.0
+    ...     load_planar_arm(), "spring", joints=[1], n_trajectories=3, duration=3.0
     ... )
     >>> model = RBDRegressor(log.robot, ("viscous", "coulomb"))
     >>> verdicts = judge_additions(model, [[("spring", [1])]], log.X, log.y)

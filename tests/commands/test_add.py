@@ -47,6 +47,7 @@ def loaded(work, tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_what_acts_in_some_recordings_is_added_to_these(loaded, run):
     (effect,) = json.loads((loaded / "report.json").read_text("utf-8"))["effects"]
     assert effect["kind"] == "payload"
@@ -101,6 +102,7 @@ def test_recordings_that_are_no_numbers_are_refused(loaded, capsys):
     assert "it must come from skidyn diagnose" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_setting_of_a_servo_is_added_to_its_controller(weak_servo, work, run):
     (effect,) = json.loads((weak_servo / "report.json").read_text("utf-8"))["effects"]
     assert (effect["kind"], effect["joints"]) == ("servo_current", [2])

@@ -19,6 +19,7 @@ def here(work, monkeypatch):
     return work
 
 
+@pytest.mark.slow
 def test_two_models_of_one_log(here, run, tmp_path):
     model = save_model(
         tmp_path / "m.skops", RBDRegressor(Robot.from_urdf("arm.urdf"), ("viscous",))

@@ -19,6 +19,7 @@ from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import Diagnosis
 
 
+@pytest.mark.slow
 def test_findings_are_judged_by_simulation_where_it_is_asked_for(work, run, saved, monkeypatch):
     judged = []
     given = Diagnosis.judge_by_simulation
@@ -122,6 +123,7 @@ def test_stamps_that_certainly_jitter_are_replaced_by_even_steps_and_this_is_tol
     assert "--clock regular" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_servos_without_torque_are_diagnosed_by_their_motion(servo_diagnosed, capsys):
     folder = Path(servo_diagnosed[1]).parent
     report = json.loads((folder / "report.json").read_text("utf-8"))

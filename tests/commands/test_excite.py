@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import pandas as pd
+import pytest
 
 from skidyn import cli
 from skidyn.datasets import load_planar_arm
@@ -33,6 +34,7 @@ def test_a_motion_too_short_to_start_and_stop_is_refused(work, tmp_path, capsys)
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_the_next_motion_adds_to_the_recordings(work, run, tmp_path):
     words = ["excite", "--urdf", work / "arm.urdf", "--duration", 4, "--motion", "quintic"]
     limits = ("--limits", '{"torque": [14, 3]}')

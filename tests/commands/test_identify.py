@@ -27,6 +27,7 @@ def test_identify_by_any_estimator_and_only_what_is_essential(capsys, estimator,
     assert "condition number of the excitation" in out and "other parameters are left out" in out
 
 
+@pytest.mark.slow
 def test_servos_are_identified_without_torque(servo_diagnosed, run):
     words = ["identify", *servo_diagnosed[1:6], "--nominal"]
     code, found = run(*words)

@@ -49,6 +49,7 @@ def test_the_same_question_has_the_same_answer_at_once(ask):
     assert second == first
 
 
+@pytest.mark.slow
 def test_another_log_or_robot_or_question_is_another(ask, tmp_path):
     ask()
     log, robot = tmp_path / "log.csv", tmp_path / "arm.urdf"
@@ -61,6 +62,7 @@ def test_another_log_or_robot_or_question_is_another(ask, tmp_path):
     assert not ask()[1]
 
 
+@pytest.mark.slow
 def test_nothing_is_kept_where_it_is_not_wanted(ask, tmp_path):
     assert ask("--no-cache")[1]
     assert not (tmp_path / ".skidyn").exists()

@@ -43,6 +43,7 @@ def test_the_payload(runs, run, tmp_path):
     assert answer["checks"] == {"loaded": [], "unloaded": []}
 
 
+@pytest.mark.slow
 def test_drive_gains(runs, run):
     folder, mass = runs
     words = ("payload", folder / "loaded_current.csv", "--unloaded", folder / "free_current.csv")
@@ -52,6 +53,7 @@ def test_drive_gains(runs, run):
     assert answer["checks"] == {"loaded": [], "unloaded": []}  # currents are as expected
 
 
+@pytest.mark.slow
 def test_a_mistake_in_currents_heads_the_gains(runs, capsys, tmp_path):
     pandas = pytest.importorskip("pandas", reason="needs skidyn[io]")
     folder, mass = runs

@@ -59,6 +59,7 @@ def test_simulate_runs_a_fitted_model_along_a_log(capsys, tmp_path):
     assert "--log is missing" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_simulate_follows_the_commands_of_a_log_without_torque(capsys, tmp_path):
     pytest.importorskip("skops")
     from skidyn import save_model

@@ -125,6 +125,7 @@ def test_ctrl_c_ends_the_explorer(short, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_lines_fit_a_narrow_terminal_and_colours_can_be_off(short):
     code, shown = in_terminal("diagnose", *short, columns=60, NO_COLOR="1")
 

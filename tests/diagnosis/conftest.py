@@ -65,7 +65,13 @@ def pushed(complete):
         return diagnose(complete.base_model, X, y, effects=[])
 
 
-@pytest.fixture(scope="session", params=HIDDEN)
+@pytest.fixture(
+    scope="session",
+    params=[
+        "unknown_cross_drag",
+        *(pytest.param(k, marks=pytest.mark.slow) for k in list(HIDDEN)[1:]),
+    ],
+)
 def nameless(request):
     """A torque that no name fits: its log, its diagnosis, its signals and its formula."""
     log = make_hidden_effect_log(load_planar_arm(), request.param, random_state=5)

@@ -11,12 +11,14 @@ from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
 
+@pytest.mark.slow
 def test_friction_whose_presliding_is_too_short_to_be_seen_is_coulomb_friction(arm_log, found_in):
     kinds = found_in(load_planar_arm(), arm_log.X, arm_log.y, effects=["viscous"])
 
     assert kinds == {"coulomb": {1, 2}}
 
 
+@pytest.mark.slow
 def test_a_limit_of_the_drive_is_read_although_the_friction_had_bent_toward_it(arm_log):
     torque = np.array(arm_log.y)
     limit = 0.55 * np.abs(torque[:, 1]).max()
@@ -31,6 +33,7 @@ def test_a_limit_of_the_drive_is_read_although_the_friction_had_bent_toward_it(a
     assert finding.parameters["share"]["value"] == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_stops_of_two_joints_are_stops_where_one_recording_alone_reaches_one_of_them(found_in):
     robot = load_scara()
     log = make_hidden_effect_log(robot, "end_stop", joints=(1, 4), noise="high", random_state=0)
@@ -38,6 +41,7 @@ def test_stops_of_two_joints_are_stops_where_one_recording_alone_reaches_one_of_
     assert found_in(robot, log.X, log.y) == {"end_stop": {1, 4}}
 
 
+@pytest.mark.slow
 def test_a_coupling_that_bodies_make_the_same_on_another_pair_of_joints_names_both_pairs():
     robot = load_scara()
     log = make_hidden_effect_log(

@@ -9,6 +9,7 @@ from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("swing", [0.0, 0.25])  # N m
 def test_elasticity_is_found_beside_a_swing_from_before_the_recording(swing):
     log = make_hidden_effect_log(

@@ -19,7 +19,13 @@ def log():
 
 
 @pytest.mark.parametrize(
-    ("frequency", "square"), [(1.37, True), (6.1, False), (37.3, False), (37.3, True)]
+    ("frequency", "square"),
+    [
+        (1.37, True),
+        pytest.param(6.1, False, marks=pytest.mark.slow),
+        (37.3, False),
+        pytest.param(37.3, True, marks=pytest.mark.slow),
+    ],
 )
 def test_a_wave_in_time_is_told_with_its_frequency(log, frequency, square):
     time = log.X["time"].to_numpy()

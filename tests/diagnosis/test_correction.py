@@ -70,10 +70,15 @@ def test_models_inside_others_are_opened(model):
     ("steps", "before"),
     [
         ([DropKeys(), Ridge()], []),
-        ([StandardScaler().set_output(transform="pandas"), DropKeys(), Ridge()], []),
-        (
+        pytest.param(
+            [StandardScaler().set_output(transform="pandas"), DropKeys(), Ridge()],
+            [],
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
             [SmoothDerivatives(cutoff=8.0).set_output(transform="pandas"), DropKeys(), Ridge()],
             ["smoothderivatives"],
+            marks=pytest.mark.slow,
         ),
     ],
     ids=["keys", "scaled", "derived"],

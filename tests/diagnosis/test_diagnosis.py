@@ -54,9 +54,14 @@ ALIKE = (
     *("viscous", "stribeck", "offset", "asymmetric_friction"),
     *("nonlinear_viscous", "temperature_friction"),
 )
+#: Tested always: friction, the tool, and a joint of six.
+FIRST = [
+    *((kind, "planar arm") for kind in ("stribeck", "payload")),
+    ("load_dependent_friction", "ur5"),
+]
 #: Kind, robot and noise: each kind with one noise on two joints, and some of them on six.
 CASES = [
-    (kind, robot, noise)
+    pytest.param(kind, robot, noise, marks=[] if (kind, robot) in FIRST else [pytest.mark.slow])
     for r, robot in enumerate(ROBOTS)
     for k, kind in enumerate(SIZE)
     for noise in [("low", "high")[(k + r) % 2]]
@@ -146,6 +151,7 @@ def found(log, X, torque):
     return [(f.kind, f.joints) for f in diagnosis.findings], said
 
 
+@pytest.mark.slow
 def test_quantised_torque(log):
     step = 0.5 * np.std(log.y, axis=0)
 
@@ -166,6 +172,7 @@ def test_a_few_broken_rows(log):
     assert "has outliers" in said
 
 
+@pytest.mark.slow
 def test_rows_repeated_by_a_logger_that_polls_too_fast(log):
     X, torque = log.X.copy(), np.array(log.y)
     columns = ["q1", "q2", "dq1", "dq2"]
@@ -179,6 +186,7 @@ def test_rows_repeated_by_a_logger_that_polls_too_fast(log):
     assert "repeat" in said
 
 
+@pytest.mark.slow
 def test_a_torque_channel_that_lags(log):
     torque = np.array(log.y)
     for name in np.unique(log.X["trajectory"]):
@@ -190,6 +198,7 @@ def test_a_torque_channel_that_lags(log):
     assert [kind for kind, _ in kinds] == ["time_delay"]
 
 
+@pytest.mark.slow
 def test_torque_cut_off_at_a_limit_is_said(log):
     limit = np.quantile(np.abs(log.y[:, 0]), 0.9)
 
@@ -265,7 +274,11 @@ def test_a_robot_that_rests_is_refused_by_a_sentence():
 
 
 @pytest.mark.parametrize(
-    ("load", "kind"), [(load_planar_arm, "load_dependent_friction"), (load_ur5, "torque_gain")]
+    ("load", "kind"),
+    [
+        (load_planar_arm, "load_dependent_friction"),
+        pytest.param(load_ur5, "torque_gain", marks=pytest.mark.slow),
+    ],
 )
 def test_a_completed_model_is_complete(load, kind):
     """Also where the effect's columns need the load or the torque of the model itself."""

@@ -31,14 +31,14 @@ FORMS = {
     "relaxes": (2, 1.8, lambda x: _relaxed(x, "q2", 0.5), {"q2", "dq2"}, None),
     "bump": (2, 1.2, lambda x: np.exp(-((x["q2"] / 0.15) ** 2)), {"q2"}, None),
 }
-#: Forms for which the signals are chosen among those of six joints; two joints take less time.
+#: Forms for which the signals are chosen among those of six joints.
 AMONG_MANY = tuple(FORMS)[:3]
 
 #: What is hidden in one log: a form alone among six joints, and one on each of two joints.
 TOGETHER = [
-    *((form,) for form in AMONG_MANY),
+    *(pytest.param((form,), marks=pytest.mark.slow) for form in AMONG_MANY),
     ("step", "bump"),
-    ("fades after a reversal", "relaxes"),
+    pytest.param(("fades after a reversal", "relaxes"), marks=pytest.mark.slow),
     ("snaps over",),
 ]
 LENGTH = {"n_trajectories": 6, "duration": 6.0}
@@ -127,6 +127,7 @@ def test_a_joint_that_rests_in_some_trajectories_is_diagnosed_all_the_same():
     assert any(2 in finding.joints for finding in diagnosis.findings)
 
 
+@pytest.mark.slow
 def test_a_product_of_signals_that_do_nothing_alone_is_followed():
     log = make_hidden_effect_log(load_ur5(), None, random_state=3, **SHORT)
     y = np.array(log.y, dtype=float)
@@ -139,6 +140,7 @@ def test_a_product_of_signals_that_do_nothing_alone_is_followed():
     assert set(finding.variables) == {"dq4", "dq5"}
 
 
+@pytest.mark.slow
 def test_what_lies_between_two_joints_is_one_finding_on_both():
     log = make_hidden_effect_log(load_ur5(), None, random_state=11, **LENGTH)
     x = log.X["q3"] + 0.6 * log.X["q4"]
@@ -155,6 +157,7 @@ def test_what_lies_between_two_joints_is_one_finding_on_both():
     assert set(finding.variables) == {"q3", "q4"}
 
 
+@pytest.mark.slow
 def test_a_bath_that_the_tool_dips_into_drags_on_all_joints():
     log = make_hidden_effect_log(load_ur5(), None, random_state=11, **SHORT)
     q, dq = (log.X[[f"{s}{j}" for j in range(1, 7)]].to_numpy() for s in ("q", "dq"))

@@ -2,10 +2,12 @@
 """Functions of the signals on which a joint's residual depends."""
 
 import numpy as np
+import pytest
 
 from skidyn.datasets import load_planar_arm
 
 
+@pytest.mark.slow
 def test_what_passes_on_another_share_of_torque_than_of_way_is_no_spring(arm_log, found_in):
     q = arm_log.X[["q1", "q2"]].to_numpy()
     torque = np.array(arm_log.y)

@@ -53,6 +53,7 @@ def diagnosed(X, torque):
         return diagnose(RBDRegressor(ROBOT, ("viscous", "coulomb")), X, torque, checks=())
 
 
+@pytest.mark.slow
 def test_friction_that_grows_with_a_load_of_some_recordings(plain):
     X, light, heavy, rest = plain
     load = np.where(np.isin(X["trajectory"], HEAVY)[:, None], heavy, light)
@@ -85,6 +86,7 @@ def test_friction_of_the_last_recording_is_no_drift(plain):
     assert said == [("coulomb", (2,), (6,))]
 
 
+@pytest.mark.slow
 def test_a_tilted_base_is_found_beside_large_friction_that_is_missing(found_in):
     robot = load_ur5()
     log = make_hidden_effect_log(
@@ -113,6 +115,7 @@ def test_friction_that_falls_while_a_gear_warms_up_is_one_drift(arm_log, found_i
     assert kinds == {"friction_drift": {1}}
 
 
+@pytest.mark.slow
 def test_a_narrow_bump_is_one_function_and_not_a_spring_and_a_stop(arm_log, found_in):
     q = arm_log.X["q1"].to_numpy()
     middle, span = np.median(q), np.ptp(q)

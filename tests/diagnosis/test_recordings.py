@@ -55,6 +55,7 @@ def test_friction_of_the_model_may_have_another_level(log):
     assert kinds == [(kind, (j,)) for kind in ("coulomb", "friction_drift") for j in (0, 1)]
 
 
+@pytest.mark.slow
 def test_an_offset_from_a_recording_on_is_one_of_the_later_recordings():
     log = make_hidden_effect_log(
         load_ur5(), None, noise="low", n_trajectories=8, duration=5.0, random_state=4

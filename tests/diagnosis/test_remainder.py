@@ -63,6 +63,7 @@ def with_coloured_noise():
     return log, noise, slow
 
 
+@pytest.mark.slow
 def test_noise_that_is_correlated_on_all_joints_alike_is_no_effect(with_coloured_noise):
     log, noise, slow = with_coloured_noise
 
@@ -74,6 +75,7 @@ def test_noise_that_is_correlated_on_all_joints_alike_is_no_effect(with_coloured
     assert "every joint" in found.story()["text"]
 
 
+@pytest.mark.slow
 def test_as_much_on_one_joint_is_told(with_coloured_noise):
     log, noise, slow = with_coloured_noise
     torque = log.y.copy()

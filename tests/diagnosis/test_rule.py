@@ -40,6 +40,7 @@ def findings_of(log, torque):
     return diagnose(RBDRegressor(log.robot, PANDA_MODEL), log.X, torque, checks=()).findings
 
 
+@pytest.mark.slow
 def test_friction_that_another_joint_modulates(panda_log):
     q, dq = panda_log.X[["q3", "dq5"]].to_numpy().T
     torque = np.array(panda_log.y)
@@ -52,6 +53,7 @@ def test_friction_that_another_joint_modulates(panda_log):
     ]
 
 
+@pytest.mark.slow
 def test_a_torque_that_sets_in_is_told_with_its_moment(panda_log):
     since = panda_log.X["time"] - panda_log.X.groupby("trajectory")["time"].transform("min")
     late = (panda_log.X["trajectory"] > 4) | ((panda_log.X["trajectory"] == 4) & (since > 1.5))
@@ -80,6 +82,7 @@ def test_a_stop_that_one_recording_touches(panda_log):
     assert found[0].error_drop > 0.5
 
 
+@pytest.mark.slow
 def test_a_plane_that_one_recording_touches(panda_log):
     robot = panda_log.robot
     q = panda_log.X[[f"q{j + 1}" for j in range(7)]].to_numpy()

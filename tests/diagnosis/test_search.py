@@ -2,6 +2,7 @@
 """Several effects at once, and effects that become each other."""
 
 import numpy as np
+import pytest
 
 from skidyn.datasets import load_planar_arm, load_scara, make_hidden_effect_log
 
@@ -12,6 +13,7 @@ def test_fast_motion_under_a_precise_torque_makes_no_joint_elastic(found_in):
     assert found_in(load_scara(), log.X, log.y) == {}
 
 
+@pytest.mark.slow
 def test_a_cable_that_only_pulls_between_two_joints(arm_log, found_in):
     q = arm_log.X[["q1", "q2"]].to_numpy()
     x = q[:, 0] - 0.8 * q[:, 1]

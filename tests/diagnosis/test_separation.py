@@ -28,6 +28,7 @@ def motion(diagnosis):
     return design_separating_motion(diagnosis, "maxwell_slip", "dahl")
 
 
+@pytest.mark.slow
 def test_hysteresis_is_told_apart_by_a_motion_that_the_log_lacked(diagnosis, motion):
     assert {"dahl", "maxwell_slip"} <= {diagnosis.findings[0].kind, *diagnosis.findings[0].rivals}
     assert motion.gain > 3 * motion.gain_of_log
@@ -66,6 +67,7 @@ def test_the_motion_as_a_table(motion):
     np.testing.assert_array_equal(table["q2"], motion.q[:, 1])
 
 
+@pytest.mark.slow
 def test_a_rival_that_contains_the_effect_cannot_be_told_from_it():
     diagnosis = diagnosis_of("spring", "nonlinear_spring")
 

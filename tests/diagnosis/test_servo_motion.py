@@ -89,6 +89,7 @@ def test_a_limit_that_the_controller_has_is_no_name(monkeypatch):
     assert asked == [[1], [1, 2]]
 
 
+@pytest.mark.slow
 def test_a_torque_of_servos_has_no_sensor_that_could_be_wrong(sticky_servo):
     log, servo = sticky_servo.log, sticky_servo.controller
     limited = replace(servo, limit=100.0)

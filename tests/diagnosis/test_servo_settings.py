@@ -73,6 +73,7 @@ def test_a_finding_is_added_to_the_controller(weak, found):
         found.add("servo_gain", [2])
 
 
+@pytest.mark.slow
 def test_a_correct_setting_improves_the_simulated_motion(found):
     limited = found.controller
     (verdict,) = found.judge_by_simulation(controller=found.controller)
@@ -82,6 +83,7 @@ def test_a_correct_setting_improves_the_simulated_motion(found):
     assert "falls" in found.story()["simulation"]["text"]
 
 
+@pytest.mark.slow
 def test_a_setting_that_worsens_the_motion_is_told_and_not_added(servo_log, found):
     fair = servo_log({})
     wrong = diagnosed(fair)
@@ -105,6 +107,7 @@ def test_a_voltage_is_told_from_a_current(servo_log):
         assert row["value"] == pytest.approx(truth, rel=0.1) and covers(row, truth)
 
 
+@pytest.mark.slow
 def test_a_gain_is_named_where_the_other_joint_is_as_stated(servo_log):
     (finding,) = diagnosed(servo_log({}, stiffness=(200.0, 8.0))).findings
     assert (finding.kind, finding.joints) == ("servo_gain", (2,))
@@ -135,6 +138,7 @@ def test_a_doubtful_log_has_no_findings_about_its_servos(servo_log):
     assert not {f.kind for f in found.findings} & set(SETTINGS)
 
 
+@pytest.mark.slow
 def test_a_deadband_that_nobody_was_told_is_named_and_added_to_the_controller(servo_log):
     loose = servo_log({}, deadband=(0.0, 0.01))
     found = diagnosed(loose, effects=["stribeck"])

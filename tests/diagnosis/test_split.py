@@ -32,7 +32,7 @@ def test_the_recordings_with_a_payload_are_told_from_the_others():
     assert (split.drop > 0).all()  # in every quarter of the recordings
 
 
-@pytest.mark.parametrize("frame", ["", "tool_"])
+@pytest.mark.parametrize("frame", [pytest.param("", marks=pytest.mark.slow), "tool_"])
 def test_a_force_beside_the_origin_of_the_tool_is_told_with_its_moment_and_frame(frame):
     log = make_hidden_effect_log(
         load_panda(), None, noise="low", n_trajectories=4, duration=4.0, random_state=0
@@ -57,6 +57,7 @@ def test_a_force_beside_the_origin_of_the_tool_is_told_with_its_moment_and_frame
     assert ("turns with the tool" in found.sentence) == bool(frame)
 
 
+@pytest.mark.slow
 def test_another_load_is_one_of_other_recordings():
     # two thirds of the recordings carry one, so that each has its own size only if all are needed
     log = make_hidden_effect_log(
@@ -83,6 +84,7 @@ def test_another_load_is_one_of_other_recordings():
     assert {f.trajectories for f in found} == set(loads)
 
 
+@pytest.mark.slow
 def test_a_payload_of_another_link_is_one_and_not_a_zero_of_its_joint():
     log = make_hidden_effect_log(
         load_ur5(), None, noise="low", n_trajectories=8, duration=5.0, random_state=1

@@ -4,6 +4,7 @@
 import warnings
 
 import numpy as np
+import pytest
 
 from skidyn.datasets import load_planar_arm, load_scara, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
@@ -17,6 +18,7 @@ def diagnosis_of(robot, effect, **options):
         return diagnose(RBDRegressor(robot), log.X, log.y, checks=())
 
 
+@pytest.mark.slow
 def test_a_play_is_not_told_as_elasticity_beside_it():
     diagnosis = diagnosis_of(
         load_planar_arm(),
@@ -33,6 +35,7 @@ def test_a_play_is_not_told_as_elasticity_beside_it():
     assert (finding.kind, finding.joints) == ("backlash", (2,))
 
 
+@pytest.mark.slow
 def test_noise_of_accelerations_in_short_windows_is_no_play():
     diagnosis = diagnosis_of(load_scara(), None, noise="low", rate=500.0, random_state=5002)
 
@@ -55,6 +58,7 @@ def test_rounded_positions_are_no_play():
     assert diagnosis.verdict == "complete"
 
 
+@pytest.mark.slow
 def test_a_swing_too_small_for_long_windows_is_found_in_short_ones():
     diagnosis = diagnosis_of(
         load_planar_arm(),

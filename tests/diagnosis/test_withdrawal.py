@@ -11,7 +11,13 @@ from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
 
-@pytest.mark.parametrize(("delay", "is_named"), [(-0.003, False), (0.003, False), (0.012, True)])
+@pytest.mark.parametrize(
+    ("delay", "is_named"),
+    [
+        (-0.003, False),
+        *(pytest.param(*c, marks=pytest.mark.slow) for c in [(0.003, False), (0.012, True)]),
+    ],
+)
 def test_a_delay_within_half_a_sampling_step_is_a_remark_and_no_finding(delay, is_named):
     """Loggers read the channels of a row one after the other."""
     log = make_hidden_effect_log(load_planar_arm(), None, noise="low", rate=100.0, random_state=1)

@@ -60,6 +60,7 @@ def test_memory_does_not_grow_with_the_number_of_trajectories(folder):
     assert peaks[2] < 2 * peaks[1]
 
 
+@pytest.mark.slow
 def test_cluster_that_loses_a_worker_gives_the_same(folder):
     distributed = pytest.importorskip("distributed")
 

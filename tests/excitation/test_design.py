@@ -84,6 +84,7 @@ def test_torque_limits_hold_for_the_robot_or_for_the_fitted_model_with_its_frict
     assert np.all(largest(whole) <= limits.torque)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("criterion", "motion"), [("determinant", "fourier"), ("condition", "quintic")]
 )

@@ -64,7 +64,9 @@ def on_a_wall(frame, path):
     return ["--gravity=-9.81,0,0", "--nominal"]
 
 
-@pytest.mark.parametrize("write", [odd_units, no_time, on_a_wall])
+@pytest.mark.parametrize(
+    "write", [odd_units, no_time, pytest.param(on_a_wall, marks=pytest.mark.slow)]
+)
 def test_the_script_gives_the_numbers_of_the_page(write, arm, log, tmp_path, monkeypatch, capsys):
     options = write(log.frame, tmp_path / "log.csv")
     served = {}

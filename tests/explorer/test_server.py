@@ -175,6 +175,7 @@ def test_a_token_of_other_letters_is_wrong_and_no_crash(port):
     assert ask(port, "/?token=%C3%A9%E2%82%AC")[0] == 403
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is another thing there")
 def test_ctrl_c_does_not_wait_for_a_report(tmp_path):
     code = (
@@ -351,6 +352,7 @@ GREEN = """(which) => {
 }"""  # noqa: E501
 
 
+@pytest.mark.slow
 def test_load_dependent_friction_of_a_real_robot_is_ticked_and_the_error_falls(ur10e, tmp_path):
     with opened(ur10e) as tab:
         tab.select_option("#joint", "2")

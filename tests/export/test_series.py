@@ -151,6 +151,7 @@ def test_the_effect_of_first_order_agrees_within_a_hundredth(robot, merged):
     assert np.all(np.abs(rigid - expected).max(axis=0) > 2 * error)
 
 
+@pytest.mark.slow
 def test_both_engines_move_alike(robot, merged):
     model = model_of(robot, ELASTIC, effects=("viscous", "rotor_inertia"))
     world, _, _ = merged(model)

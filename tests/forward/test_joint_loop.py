@@ -35,6 +35,7 @@ def loop_of(**limits):
 FRICTION = {"viscous": np.array([0.03]), "coulomb": np.array([0.06])}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [{}, {"limit": 1.0}, {"limit": 1.5, "no_load_speed": 6.0}])
 def test_a_joint_follows_the_whole_model(words):
     loop = loop_of(**words)

@@ -8,7 +8,13 @@ from skidyn.datasets import load_planar_arm, load_ur5
 from skidyn.effects import Term
 
 
-@pytest.mark.parametrize("arm", [load_planar_arm, load_ur5], ids=["planar", "ur5"])
+@pytest.mark.parametrize(
+    "arm",
+    [
+        pytest.param(load_planar_arm, id="planar"),
+        pytest.param(load_ur5, id="ur5", marks=pytest.mark.slow),
+    ],
+)
 def test_agrees_with_mujoco(arm, fitted, log_of, moved):
     pytest.importorskip("mujoco")
     robot = arm()

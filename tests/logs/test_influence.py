@@ -2,6 +2,7 @@
 """What matters most is reported first."""
 
 import numpy as np
+import pytest
 
 from skidyn.datasets import load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
@@ -23,6 +24,7 @@ def test_the_mistake_that_changes_more_is_reported_first():
     assert first.influence > 0.3 and first.influence > second.influence
 
 
+@pytest.mark.slow
 def test_the_order_follows_the_influence():
     flipped = UR5.frame.assign(tau2=-UR5.frame["tau2"], q4=UR5.frame["q4"] + 0.3)
     told = [c for c in check_log(flipped, UR5.robot).checks if c.certainty == "certain"]
@@ -30,6 +32,7 @@ def test_the_order_follows_the_influence():
     assert len(told) == 2 and shares == sorted(shares, reverse=True)
 
 
+@pytest.mark.slow
 def test_gravity_of_a_robot_on_a_wall_has_an_influence():
     wall = UR5.robot.with_gravity([0.0, -9.81, 0.0])
     log = make_hidden_effect_log(wall, None, n_trajectories=4, duration=6.0, random_state=3)
@@ -44,6 +47,7 @@ def test_without_a_robot_nothing_is_fitted():
     assert all(c.influence is None for c in checks)
 
 
+@pytest.mark.slow
 def test_limitations_of_a_log_have_no_influence():
     coarse = UR5.frame.assign(q1=UR5.frame["q1"].round(2))
     noted = [c for c in check_log(coarse, UR5.robot).checks if c.certainty == "noted"]

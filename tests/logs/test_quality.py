@@ -27,6 +27,7 @@ def test_good_log_raises_no_suspicion():
         assert 0 < joint.position_coverage < 1 and joint.excited and joint.reversals > 5
 
 
+@pytest.mark.slow
 def test_delay_is_measured():
     late = make_hidden_effect_log(PANDA, "time_delay", n_trajectories=4, duration=6.0)
     quality = check_log(late.frame, PANDA)
@@ -133,6 +134,7 @@ def test_inconsistent_units_are_suspected(change, unit):
     assert any(unit in text for text in check_log(other).warnings)
 
 
+@pytest.mark.slow
 def test_currents_passed_as_torques_are_suspected():
     panda = load_panda()
     log = make_hidden_effect_log(panda, None, n_trajectories=3, duration=5.0).frame

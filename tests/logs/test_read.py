@@ -314,6 +314,7 @@ KNOWN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KNOWN)
 def test_recording_is_read_and_judged(name, data_dir):
     file = data_dir / name

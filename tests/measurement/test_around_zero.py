@@ -30,6 +30,7 @@ def test_current_below_a_threshold_is_zero(kept):
     assert "exactly zero" in told.evidence
 
 
+@pytest.mark.slow
 def test_a_coarse_torque_that_passes_zero_has_no_dead_band():
     coarse = {name: np.round(LOG.frame[name] / 0.5) * 0.5 for name in TORQUES}
     assert "dead_band" not in told_of(LOG.frame.assign(**coarse))
@@ -52,6 +53,7 @@ def test_torque_that_was_set_to_zero_for_each_recording(change, words):
     assert not {"reading", "odd_recording", "unexplained", "torque_scale"} & set(told)
 
 
+@pytest.mark.slow
 def test_torque_without_gravity_was_not_tared():
     robot = LOG.robot
     pull = robot.gravity_torque(LOG.frame[[f"q{k + 1}" for k in range(6)]].to_numpy())

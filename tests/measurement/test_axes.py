@@ -24,6 +24,7 @@ def turned(robot, joint, direction):
     return replace(robot, tree=replace(robot.tree, axes=axes))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint, direction", [(2, (0, 1, 0)), (4, (-1, 0, 0))])
 def test_another_axis_of_a_joint_is_told_alone(log, joint, direction):
     claimed = turned(log.robot, joint, direction)
@@ -34,15 +35,18 @@ def test_another_axis_of_a_joint_is_told_alone(log, joint, direction):
     assert f'<axis xyz="{own}"/>' in told[0].evidence
 
 
+@pytest.mark.slow
 def test_the_right_axes_are_left_alone(log):
     assert "axes" not in {s.check for s in check_log(log.frame, log.robot).checks}
 
 
+@pytest.mark.slow
 def test_a_sign_is_no_axis(log):
     told = check_log(log.frame.assign(tau2=-log.frame["tau2"]), log.robot).checks
     assert "axes" not in {s.check for s in told}
 
 
+@pytest.mark.slow
 def test_bodies_that_mimic_others_are_left_out(log):
     """They have no columns of their own, so that nothing is said of any axis."""
     finger = (

@@ -20,7 +20,7 @@ def test_a_description_without_gravity(arm, recorded, told_of):
     assert z == pytest.approx(-9.8, abs=0.3) and abs(y) < 0.1 and abs(x) < 2
 
 
-@pytest.mark.parametrize("joint", [3, 4])
+@pytest.mark.parametrize("joint", [3, pytest.param(4, marks=pytest.mark.slow)])
 def test_an_angle_against_the_base(joint):
     log = make_hidden_effect_log(load_ur5(), None, n_trajectories=4, duration=4.0)
     frame = log.frame

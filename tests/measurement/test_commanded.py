@@ -2,6 +2,7 @@
 """Positions without noise."""
 
 import numpy as np
+import pytest
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
@@ -33,6 +34,7 @@ def test_commands_ahead_of_the_motion():
     assert found["torque_delay"].remedy.option.startswith("--late tau=0.0")
 
 
+@pytest.mark.slow
 def test_positions_of_uneven_samples_scatter_by_their_noise():
     """A smooth motion has next to none, whatever the steps of the clock."""
     rng = np.random.default_rng(0)

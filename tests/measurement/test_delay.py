@@ -33,11 +33,13 @@ def test_torque_that_is_late():
     assert name == "--late tau" and float(value) == 0.02  # a whole number of samples
 
 
+@pytest.mark.slow
 def test_a_delay_of_a_fraction_of_a_sample():
     (told,) = late(lambda since: np.full_like(since, 0.0237))
     assert float(told.remedy.option.split("=")[1]) == pytest.approx(0.0237, abs=5e-4)
 
 
+@pytest.mark.slow
 def test_clocks_of_other_rates():
     (told,) = late(lambda since: 0.005 * since)
     what = "the clock of the torque runs at a different rate than that of the motion"
@@ -59,11 +61,13 @@ def test_one_recording_that_is_late():
     assert told.certainty == "suspected" and told.remedy is None
 
 
+@pytest.mark.slow
 def test_torque_that_is_late_by_more_than_the_usual_lags():
     (told,) = late(lambda t: np.full_like(t, 0.11))
     assert float(told.remedy.option.partition("=")[2]) == pytest.approx(0.11, abs=0.01)
 
 
+@pytest.mark.slow
 def test_one_recording_that_is_late_by_more_than_the_usual_lags():
     robot = load_ur5()
     frame = make_hidden_effect_log(robot, None, n_trajectories=5, random_state=3).frame

@@ -98,6 +98,7 @@ def test_a_correct_gain_is_still_found(log, told):
     assert others == ["torque_scale"]
 
 
+@pytest.mark.slow
 def test_one_link_of_a_larger_arm():
     robot = load_ur5()
     parameters = np.array(robot.inertial_parameters, dtype=float)

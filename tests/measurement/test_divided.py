@@ -36,9 +36,9 @@ def told(frame):
     "name, change, what, count",
     [
         ("tau3", lambda x: -x, "opposite sign", 2),
-        ("tau6", lambda x: -x, "opposite sign", 3),
-        ("tau2", lambda x: 10 * x, " is 10", 3),
-        ("q3", lambda x: x + 0.7, "the zero of", 2),
+        pytest.param("tau6", lambda x: -x, "opposite sign", 3, marks=pytest.mark.slow),
+        pytest.param("tau2", lambda x: 10 * x, " is 10", 3, marks=pytest.mark.slow),
+        pytest.param("q3", lambda x: x + 0.7, "the zero of", 2, marks=pytest.mark.slow),
     ],
 )
 def test_recordings_of_two_kinds_are_told_alone(name, change, what, count):
@@ -53,12 +53,14 @@ def test_recordings_of_two_kinds_are_told_alone(name, change, what, count):
     assert f"in trajectories {', '.join(early)} and {last} " in one.suspicion
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ["payload", "external_wrench", "environment_contact"])
 def test_effects_of_some_recordings_are_no_mistake(effect, checked):
     told = checked(effect, **OPTIONS).checks
     assert "divided_recordings" not in {s.check for s in told if s.certainty != "noted"}
 
 
+@pytest.mark.slow
 def test_a_payload_that_multiplies_the_load_of_a_wrist_is_no_mistake():
     frame = make_hidden_effect_log(ROBOT, "payload", random_state=7411957).frame
     assert "divided_recordings" not in {s.check for s in told(frame)}

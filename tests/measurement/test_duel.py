@@ -30,7 +30,10 @@ def readings(frame, robot=ROBOT):
     return [s for s in check_log(frame, robot).checks if s.check == "reading"]
 
 
-@pytest.mark.parametrize("frame", [PLAIN, SPRUNG], ids=["plain", "spring"])
+@pytest.mark.parametrize(
+    "frame",
+    [pytest.param(PLAIN, id="plain", marks=pytest.mark.slow), pytest.param(SPRUNG, id="spring")],
+)
 def test_no_effect_takes_the_place_of_a_sign(frame):
     checks = check_log(frame.assign(tau3=-frame["tau3"]), ROBOT).checks
     (told,) = [s for s in checks if s.certainty != "noted"]

@@ -21,6 +21,7 @@ def remedied(log, gains):
     return {int(word[3]): float(word.split("=")[1]) for word in words}
 
 
+@pytest.mark.slow
 def test_currents_are_known_against_each_other(log):
     gains = dict(zip(range(1, 7), (11.0, 23.0, 17.3, 31.0, 12.7, 44.0), strict=True))
     found = remedied(log, gains)
@@ -28,12 +29,14 @@ def test_currents_are_known_against_each_other(log):
     assert shares / shares.mean() == pytest.approx(np.ones(4), abs=0.03)
 
 
+@pytest.mark.slow
 def test_one_gear_ratio_for_all_is_one_factor(log):
     found = remedied(log, dict.fromkeys(range(1, 7), 100.0))
     assert len(set(found.values())) == 1
     assert next(iter(found.values())) == pytest.approx(100, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_single_factor_is_the_round_number_near_by(log):
     assert remedied(log, {2: 0.25}) == {2: 0.25}
 

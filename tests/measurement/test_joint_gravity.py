@@ -14,7 +14,7 @@ def told(frame):
     return [s for s in check_log(frame, ROBOT).checks if s.certainty != "noted"]
 
 
-@pytest.mark.parametrize("joint", [2, 3])
+@pytest.mark.parametrize("joint", [pytest.param(2, marks=pytest.mark.slow), 3])
 def test_one_joint_without_gravity_is_told_alone(joint):
     frame = make_hidden_effect_log(ROBOT, "stribeck", joints=[5], **OPTIONS).frame
     pull = ROBOT.gravity_torque(frame[[f"q{k + 1}" for k in range(6)]].to_numpy())
@@ -23,6 +23,7 @@ def test_one_joint_without_gravity_is_told_alone(joint):
     assert (one.check, one.joints, one.certainty) == ("joint_gravity", (joint,), "suspected")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ["payload", "gravity_compensator", "spring"])
 def test_effects_that_change_gravity_are_no_mistake(effect):
     frame = make_hidden_effect_log(ROBOT, effect, **OPTIONS).frame

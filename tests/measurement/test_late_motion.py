@@ -40,6 +40,7 @@ def test_play_of_a_gear_is_no_late_motion():
     assert not any(words.startswith("position and velocity") for words in told)
 
 
+@pytest.mark.slow
 def test_a_load_of_some_recordings_does_not_hide_it(loaded):
     told = check_log(late(loaded.frame, 4, 0.03), ROBOT).checks
     (told,) = [s for s in told if s.check == "torque_delay"]

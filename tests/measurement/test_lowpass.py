@@ -42,7 +42,10 @@ def test_what_a_low_pass_was_given_comes_back():
     np.testing.assert_allclose(without_lowpass(time, low_pass(time, values), 0.04), values)
 
 
-@pytest.mark.parametrize("quantity", ["tau", "q", "dq"])
+@pytest.mark.parametrize(
+    "quantity",
+    [*(pytest.param(name, marks=pytest.mark.slow) for name in ("tau", "q")), "dq"],
+)
 def test_a_filtered_quantity_is_not_late(quantity):
     names = [f"{quantity}{k}" for k in range(1, 7)]
     check = "torque_delay" if quantity == "tau" else "velocity_delay"

@@ -11,7 +11,7 @@ from skidyn.datasets import (
 from skidyn.logs import check_log
 
 
-@pytest.mark.parametrize("factor", [0.5, 4.0])
+@pytest.mark.parametrize("factor", [0.5, pytest.param(4.0, marks=pytest.mark.slow)])
 def test_a_rate_that_is_wrong_in_clock_and_velocities(factor, told_of):
     robot = load_ur5()
     frame = make_hidden_effect_log(

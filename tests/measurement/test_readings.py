@@ -54,6 +54,7 @@ def test_a_joint_that_counts_the_other_way_from_another_zero(signals, torque, fo
     assert [s.remedy.option for s in told] == ["--flip q2,tau2", "--zero q2=-1.5708"]
 
 
+@pytest.mark.slow
 def test_a_torque_that_is_turned_round_twice_is_as_it_was():
     """The sign of all torques is found first, and then that of joint 1 again."""
     robot = load_ur5()
@@ -70,6 +71,7 @@ def test_upside_down_goes_before_a_first_joint_half_a_turn_off(arm, recorded, to
     assert "zero" in told.evidence
 
 
+@pytest.mark.slow
 def test_zeros_of_two_joints_are_refined_together():
     log = make_hidden_effect_log(
         load_panda(), None, n_trajectories=5, duration=6.0, random_state=9700101
@@ -87,6 +89,7 @@ def test_a_zero_is_within_half_a_turn(signals, torque, found):
     assert value == pytest.approx(3.0, abs=0.02)
 
 
+@pytest.mark.slow
 def test_gravity_that_was_removed_with_bodies_that_are_not_those_of_the_robot():
     """The rest of it that is left looks like another scale of single torques."""
     robot = load_panda()
@@ -139,6 +142,7 @@ def test_a_load_of_some_recordings_hides_no_sign():
     assert told.check == "reading" and told.remedy.option == "--flip tau3"
 
 
+@pytest.mark.slow
 def test_a_load_of_some_recordings_does_not_hide_removed_gravity(loaded):
     assert not [s for s in loaded.checks if s.certainty != "noted"]
     changed = without_gravity(loaded.frame, loaded.robot)

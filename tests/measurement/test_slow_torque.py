@@ -53,6 +53,7 @@ def test_torque_that_was_measured_in_every_row():
     assert told_of() == {}
 
 
+@pytest.mark.slow
 def test_joints_whose_noise_hides_the_bus_are_shown_by_the_others():
     robot = load_ur5()
     frame = make_hidden_effect_log(robot, None, n_trajectories=5, random_state=4).frame

@@ -64,6 +64,7 @@ def wrist():
     ).frame
 
 
+@pytest.mark.slow
 def test_a_last_joint_with_friction_alone_is_in_the_unit_of_the_one_before(wrist):
     robot, frame = wrist
     both = frame.assign(**{n: 1e3 * frame[n] for n in ("tau5", "tau6")})

@@ -180,6 +180,7 @@ def client():
         yield client
 
 
+@pytest.mark.slow
 def test_bagged_members_are_bit_equal(client, log):
     X, y = log
     member = LSTMRegressor(window=4, hidden_size=4, max_epochs=2)

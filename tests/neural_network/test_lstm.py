@@ -101,6 +101,7 @@ def test_the_direction_of_velocities_is_an_input():
     assert bagged.bagging_.estimators_[0].direction == [1]
 
 
+@pytest.mark.slow
 def test_the_linear_path_reaches_beyond_the_training_range():
     rng = np.random.default_rng(0)
     X = rng.normal(size=(600, 2))

@@ -36,6 +36,7 @@ class Backwards(RBDRegressor):
         return self
 
 
+@pytest.mark.slow
 def test_the_wrong_sign_of_the_true_effect_worsens_and_is_not_kept(log):
     wrong, idle = judge_additions(
         Backwards(log.robot, FRICTION),
@@ -48,6 +49,7 @@ def test_the_wrong_sign_of_the_true_effect_worsens_and_is_not_kept(log):
     assert idle.before.score < wrong.after.score, "judged without what has worsened the motion"
 
 
+@pytest.mark.slow
 def test_pieces_of_one_recording_are_left_out_where_there_is_one(log):
     one = (log.frame["trajectory"] == 1).to_numpy()
     X = log.X[one].drop(columns="trajectory")
@@ -69,6 +71,7 @@ def test_what_simulation_cannot_tell_is_none(log):
         judge_additions(RBDRegressor(log.robot, FRICTION), [], log.X.to_numpy(), log.y)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_keeps_what_helps_and_tells_what_does_not(log, diagnosis):
     kinds = [finding.kind for finding in diagnosis.findings]
     assert kinds == ["spring"]
@@ -86,6 +89,7 @@ def test_a_diagnosis_keeps_what_helps_and_tells_what_does_not(log, diagnosis):
     assert not [note for note in diagnosis.warnings if "worsens the simulated motion" in note]
 
 
+@pytest.mark.slow
 def test_findings_of_a_log_of_commands_are_judged_through_the_servo(log):
     servo = Controller(60.0, 4.0, follows_velocity=False)
     torque = np.asarray(log.y)

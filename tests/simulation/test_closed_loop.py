@@ -79,6 +79,7 @@ def test_both_integrators_agree_without_dry_friction():
     np.testing.assert_allclose(one[["q1", "q2"]], other[["q1", "q2"]], atol=2e-4)
 
 
+@pytest.mark.slow
 def test_it_makes_the_instruments_that_undo_the_bias_of_noise(truth):
     reference, rng = make_reference(), np.random.default_rng(3)
     measured = simulate_closed_loop(truth, reference, STIFFNESS, DAMPING)

@@ -71,6 +71,7 @@ def test_motion_that_explodes_is_infinite_not_silent(log, models):
     assert "without bound" in verdict.text
 
 
+@pytest.mark.slow
 def test_an_effect_that_refuses_motion_without_bound_does_not_stop_the_rest(log):
     class Wary(Effect):
         kind = "wary"
@@ -94,6 +95,7 @@ def test_an_effect_that_refuses_motion_without_bound_does_not_stop_the_rest(log)
         unregister_effect("wary")
 
 
+@pytest.mark.slow
 def test_scorer_prefers_the_model_that_moves_like_the_robot(log):
     cv = TrajectoryKFold(2)
     scores = [

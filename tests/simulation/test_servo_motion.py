@@ -47,6 +47,7 @@ def test_nothing_is_named_where_friction_is_all(servo_log):
     assert explain_servo_motion(fitted(smooth), smooth.log, smooth.controller) == []
 
 
+@pytest.mark.slow
 def test_nothing_is_named_where_the_gain_is_wrong(sticky_servo):
     wrong = Controller((200.0, 0.3 * 12.0), (12.0, 0.6), follows_velocity=False)
     assert explain_servo_motion(fitted(sticky_servo), sticky_servo.log, wrong, joints=[2]) == []
@@ -66,6 +67,7 @@ def test_a_joint_that_the_robot_lacks_and_a_short_log_are_refused(sticky_servo):
         explain_servo_motion(model, log[log["trajectory"] == 1], servo)
 
 
+@pytest.mark.slow
 def test_effects_of_two_joints_are_named_one_after_the_other(servo_log):
     shapes = {"vs": 0.1, "delta": 2.0}
     sticky = servo_log({Term("stribeck", (1,), shapes): 2.0, Term("stribeck", (2,), shapes): 0.15})
@@ -73,6 +75,7 @@ def test_effects_of_two_joints_are_named_one_after_the_other(servo_log):
     assert sorted((f.kind, f.joint) for f in found) == [("stribeck", 1), ("stribeck", 2)]
 
 
+@pytest.mark.slow
 def test_what_is_known_is_not_named_again(sticky_servo):
     model, log, servo = fitted(sticky_servo), sticky_servo.log, sticky_servo.controller
     assert explain_servo_motion(model, log, servo, known=[("stribeck", 2)]) == []

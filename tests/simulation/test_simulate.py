@@ -9,7 +9,17 @@ from skidyn.identification import RBDRegressor
 from skidyn.simulation import simulate
 
 
-@pytest.mark.parametrize("kind", ["dahl", "load_dependent_friction", "time_delay", "backlash"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "dahl",
+        "time_delay",
+        *(
+            pytest.param(kind, marks=pytest.mark.slow)
+            for kind in ("load_dependent_friction", "backlash")
+        ),
+    ],
+)
 def test_effect_that_is_there_improves_the_motion(kind):
     log = make_hidden_effect_log(
         load_planar_arm(), kind, joints=[1], n_trajectories=4, duration=5.0

@@ -66,6 +66,7 @@ def run(data_dir, monkeypatch):
     return run_example
 
 
+@pytest.mark.slow
 def test_ur10e_effects_found_on_some_recordings_cut_the_error_of_others(run):
     result = run("plot_real_ur10e.py")
 
@@ -80,6 +81,7 @@ def test_ur10e_effects_found_on_some_recordings_cut_the_error_of_others(run):
     assert all(error.beyond < 0.5 * error.rmse for error in result["REST"])
 
 
+@pytest.mark.slow
 def test_payloads_that_come_and_that_are_not_there(run):
     result = run("plot_real_payload.py")
 

@@ -3,7 +3,10 @@
 
 import json
 
+import pytest
 
+
+@pytest.mark.slow
 def test_joints_count_from_one_and_values_are_those_of_json(written):
     (effect,) = json.loads(written.truth.read_text())["effects"]
     assert set(effect["joints"]) <= {1, 2} and effect["joints"]
