@@ -23,7 +23,8 @@ PYTEST_ARGS ?=
 # it lacks, and not by the size of a robot or the accuracy of an answer.
 OLDEST ?= .venv-oldest
 CORE_TESTS ?= $(addprefix tests/,robots dynamics identification effects evidence metrics \
-    model_selection preprocessing neural_network committee fleet)
+    model_selection preprocessing neural_network/test_lstm.py neural_network/test_skorch_member.py \
+    committee fleet whole/test_archives.py)
 
 BIN := $(VENV)/bin
 # --no-compile: Python compiles what is imported, which is a small part of these packages

@@ -2,6 +2,7 @@
 """Settings and fixtures of the whole test suite."""
 
 import hashlib
+import importlib
 import os
 import pickle
 import shutil
@@ -48,13 +49,15 @@ def c_compiler() -> str:
 
 @pytest.fixture(scope="session")
 def fresh_processes():
-    """No processes of joblib are left from other tests.
+    """No processes of joblib are left from other tests, and two new ones have loaded torch.
 
     One that loads torch after its first task is taken for one that leaks memory, and is replaced.
     """
+    from joblib import Parallel, delayed
     from joblib.externals.loky import get_reusable_executor
 
     get_reusable_executor().shutdown(wait=True)
+    Parallel(n_jobs=2)(delayed(importlib.import_module)("skorch") for _ in range(2))
 
 
 @pytest.fixture

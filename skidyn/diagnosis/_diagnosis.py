@@ -146,7 +146,9 @@ def diagnose(
     --------
     >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
     >>> from skidyn.identification import RBDRegressor
-    >>> log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2])
+    >>> log = make_hidden_effect_log(
+    ...     load_planar_arm(), "stribeck", joints=[2], n_trajectories=6, duration=5.0
+    ... )
     >>> diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y)
     >>> [(finding.kind, finding.joints) for finding in diagnosis.findings]
     [('stribeck', (2,))]

@@ -121,7 +121,9 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
     --------
     >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
     >>> from skidyn.identification import RBDRegressor
-    >>> log = make_hidden_effect_log(load_planar_arm(), "stribeck", joints=[2])
+    >>> log = make_hidden_effect_log(
+    ...     load_planar_arm(), "stribeck", joints=[2], n_trajectories=6, duration=5.0
+    ... )
     >>> search = EffectSearchCV(RBDRegressor(log.robot)).fit(log.X, log.y)
     >>> search.cv_results_["added"].tolist()
     [None, 'stribeck']

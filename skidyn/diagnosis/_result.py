@@ -115,7 +115,7 @@ class Diagnosis:
     >>> from skidyn.datasets import load_planar_arm, make_hidden_effect_log
     >>> from skidyn.diagnosis import diagnose
     >>> from skidyn.identification import RBDRegressor
-    >>> log = make_hidden_effect_log(load_planar_arm(), None)
+    >>> log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=6, duration=5.0)
     >>> diagnose(RBDRegressor(log.robot), log.X, log.y).verdict
     'complete'
     """

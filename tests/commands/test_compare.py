@@ -93,6 +93,7 @@ def test_compare_knows_joints_trajectories_and_regimes(capsys, run, arguments):
     assert "reversal" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_traces_hold_a_recording_that_is_in_the_log_twice_once(here, capsys, tmp_path):
     pytest.importorskip("mcap_ros2", reason="needs skidyn[io]")
     frame = pandas.read_csv("log.csv")

@@ -70,6 +70,7 @@ def test_nothing_is_kept_where_it_is_not_wanted(ask, tmp_path):
     assert ask("--no-cache")[1]
 
 
+@pytest.mark.slow
 def test_a_damaged_answer_is_none(ask, tmp_path):
     first, _ = ask()
     (kept,) = (tmp_path / ".skidyn").iterdir()

@@ -68,6 +68,7 @@ def test_a_mistake_in_currents_heads_the_gains(runs, capsys, tmp_path):
     assert "fix it with: --flip tau2" in out
 
 
+@pytest.mark.slow
 def test_a_link_that_is_not_there(runs, capsys):
     folder, _ = runs
     words = ["payload", folder / "loaded.csv", "--unloaded", folder / "free.csv"]

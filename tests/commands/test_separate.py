@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import pandas as pd
+import pytest
 
 from skidyn import cli
 
@@ -22,6 +23,7 @@ def test_the_motion_and_its_worth(report, run, tmp_path, monkeypatch):
     assert pd.read_csv(out)["time"].iloc[-1] < 10
 
 
+@pytest.mark.slow
 def test_rivals_that_were_not_compared(report, tmp_path, capsys):
     out = tmp_path / "motion.csv"
     words = ["separate", "--from", report, "--out", out, "--effect", "payload"]

@@ -51,11 +51,23 @@ def test_a_corrected_model_refits(of_ridge):
 @pytest.mark.parametrize(
     "model",
     [
-        GridSearchCV(RBDRegressor(LOG.robot), {"estimator": ["weighted"]}, cv=TrajectoryKFold(2)),
-        TransformedTargetRegressor(RBDRegressor(LOG.robot), transformer=StandardScaler()),
-        Pipeline([("nothing", "passthrough"), ("model", RBDRegressor(LOG.robot))]),
+        pytest.param(
+            GridSearchCV(
+                RBDRegressor(LOG.robot), {"estimator": ["weighted"]}, cv=TrajectoryKFold(2)
+            ),
+            id="search",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            TransformedTargetRegressor(RBDRegressor(LOG.robot), transformer=StandardScaler()),
+            id="target",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            Pipeline([("nothing", "passthrough"), ("model", RBDRegressor(LOG.robot))]),
+            id="pipeline",
+        ),
     ],
-    ids=["search", "target", "pipeline"],
 )
 def test_models_inside_others_are_opened(model):
     diagnosis = diagnosed(model.fit(LOG.X, LOG.y))

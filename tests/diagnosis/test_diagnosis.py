@@ -160,6 +160,7 @@ def test_quantised_torque(log):
     assert kinds == []
 
 
+@pytest.mark.slow
 def test_a_few_broken_rows(log):
     torque = np.array(log.y)
     rng = np.random.default_rng(0)
@@ -234,6 +235,7 @@ def test_no_physics_is_named_while_a_unit_is_in_doubt():
     assert {finding.kind for finding in doubted.findings} == {"unknown"}
 
 
+@pytest.mark.slow
 def test_an_effect_is_found_beside_a_joint_that_rests():
     robot, rng = load_planar_arm(), np.random.default_rng(0)
     tables, torques = [], []

@@ -93,6 +93,7 @@ def test_keeps_findings_only_as_far_as_they_raise_the_score(log):
     np.testing.assert_allclose(search.predict(log.X), alone.predict(log.X), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_gain_of_a_single_fold_keeps_nothing(log):
     folds = list(GroupKFold(5).split(log.X, groups=log.X["trajectory"]))
 

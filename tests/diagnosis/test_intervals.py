@@ -2,6 +2,7 @@
 """Intervals of parameters by leaving folds out."""
 
 import numpy as np
+import pytest
 
 from skidyn.datasets import load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose, parameter_intervals
@@ -28,6 +29,7 @@ def test_shapes_that_are_held_make_intervals_no_wider(missing):
                 assert interval[2] - interval[1] <= 1.01 * (wide[2] - wide[1])
 
 
+@pytest.mark.slow
 def test_a_fine_ripple_has_narrow_intervals_of_its_waves_and_size():
     # a wave of 60 periods per rad is another one at waves that differ by two per cent
     log = make_hidden_effect_log(

@@ -77,6 +77,7 @@ def test_is_predicted_for_these_recordings_only(log, diagnosed):
     assert np.std(error) < 0.1 * np.std(rising(log)[inside])
 
 
+@pytest.mark.slow
 def test_an_effect_of_all_recordings_has_no_part(log, diagnosed):
     everywhere = tuple(np.unique(log.X["trajectory"]))
 

@@ -28,6 +28,7 @@ def test_a_formula_is_proposed_and_adopted_with_one_call(nameless):
     assert np.all(error < 1.1 * diagnosis.rmse_after)
 
 
+@pytest.mark.slow
 def test_a_torque_periodic_in_time_gets_its_wave_as_formula():
     log = make_hidden_effect_log(
         load_planar_arm(), "unknown_clock", n_trajectories=6, duration=6.0, random_state=5

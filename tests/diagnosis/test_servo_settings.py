@@ -54,6 +54,7 @@ def test_a_limit_of_the_current_is_named_with_its_size(found):
     assert str(found).count("Current limit of the servo on joint 2: limit = 0.4") == 1
 
 
+@pytest.mark.slow
 def test_the_rest_is_judged_by_the_servo_with_its_limit(weak, found):
     assert found.controller.limit.tolist() == [
         np.inf,

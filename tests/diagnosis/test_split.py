@@ -32,7 +32,8 @@ def test_the_recordings_with_a_payload_are_told_from_the_others():
     assert (split.drop > 0).all()  # in every quarter of the recordings
 
 
-@pytest.mark.parametrize("frame", [pytest.param("", marks=pytest.mark.slow), "tool_"])
+@pytest.mark.slow
+@pytest.mark.parametrize("frame", ["", "tool_"])
 def test_a_force_beside_the_origin_of_the_tool_is_told_with_its_moment_and_frame(frame):
     log = make_hidden_effect_log(
         load_panda(), None, noise="low", n_trajectories=4, duration=4.0, random_state=0

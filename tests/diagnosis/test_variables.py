@@ -2,6 +2,7 @@
 """The signals that a nameless torque depends on, by test."""
 
 import numpy as np
+import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
@@ -22,6 +23,7 @@ def test_the_signals_are_those_the_torque_depends_on(nameless):
             assert test.p_value < 0.01 if test.needed else test.share < 0.05
 
 
+@pytest.mark.slow
 def test_a_temperature_of_the_recording_is_no_signal_of_its_torque():
     """In blocks of few recordings, a function of it would be one of the recording."""
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=6, duration=4.0)

@@ -16,7 +16,9 @@ FAST = {"duration": 6.0, "iterations": 4}
 
 
 @pytest.mark.parametrize("motion", ["fourier", "quintic"])
-@pytest.mark.parametrize("load", [load_planar_arm, load_scara, load_ur5])
+@pytest.mark.parametrize(
+    "load", [load_planar_arm, load_scara, pytest.param(load_ur5, marks=pytest.mark.slow)]
+)
 def test_every_limit_holds_and_the_motion_starts_and_ends_at_rest(load, motion):
     robot = load()
     given = MotionLimits(acceleration=np.full(robot.n_joints, 3.0))
@@ -51,6 +53,7 @@ def test_limits_and_rest_hold_for_long_motions_short_blends_and_odd_times(durati
     assert np.abs(ddq[-1]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_workspace_moves_the_motion_and_does_not_only_shrink_it():
     robot = load_planar_arm()
     box = np.array([[-0.1, 0.3], [-1.0, 1.0], [-0.3, 0.3]])

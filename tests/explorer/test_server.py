@@ -327,7 +327,9 @@ def test_the_loop_by_keyboard_alone(explorer):
     assert now < 0.2 * given
 
 
-@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 800)])
+@pytest.mark.parametrize(
+    ("scheme", "width"), [pytest.param("light", 1280, marks=pytest.mark.slow), ("dark", 800)]
+)
 def test_the_clicked_time_is_marked_and_nothing_overflows(explorer, scheme, width):
     look = {"color_scheme": scheme, "viewport": {"width": width, "height": 860}}
     with opened(explorer, **look) as tab:

@@ -139,7 +139,7 @@ def called(package, name, motion, folder):
     return table[:, : n * n].reshape(-1, n, n), *np.split(table[:, n * n :], 4, axis=1)
 
 
-@pytest.mark.parametrize("name", ["tree", "scara"])
+@pytest.mark.parametrize("name", ["tree", pytest.param("scara", marks=pytest.mark.slow)])
 def test_the_plugin_gives_the_torque_of_the_model(models, name, states, tmp_path):
     model = models[name]
     left = write_ros2(model, tmp_path / "own", package="own_dynamics")

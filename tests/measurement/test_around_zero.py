@@ -20,7 +20,7 @@ def in_runs(frame, change):
     return frame.assign(**{n: frame.groupby("trajectory")[n].transform(change) for n in TORQUES})
 
 
-@pytest.mark.parametrize("kept", [True, False])
+@pytest.mark.parametrize("kept", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_current_below_a_threshold_is_zero(kept):
     tau = LOG.frame["tau1"].to_numpy()
     least = 0.2 * np.abs(tau).max()

@@ -17,7 +17,7 @@ def in_batches(frame, size):
     return frame.assign(time=stamps)
 
 
-@pytest.mark.parametrize("size", [12, 40])
+@pytest.mark.parametrize("size", [pytest.param(12, marks=pytest.mark.slow), 40])
 def test_stamps_of_arrival_in_batches(recorded, arm, told_of, tmp_path, size):
     frame = in_batches(recorded.frame, size)
 

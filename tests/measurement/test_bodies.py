@@ -43,7 +43,7 @@ def test_slow_noise_that_a_function_of_the_position_could_follow(recorded, told_
     assert told_of(frame)["unexplained"].joints == (2,)
 
 
-@pytest.mark.parametrize("factor", [1e-3, 1e3])
+@pytest.mark.parametrize("factor", [1e-3, pytest.param(1e3, marks=pytest.mark.slow)])
 def test_a_robot_of_any_weight_is_checked_alike(arm, recorded, factor):
     other = replace(arm, inertial_parameters=factor * arm.inertial_parameters)
     names = [f"tau{k + 1}" for k in range(arm.n_joints)]

@@ -14,7 +14,9 @@ def told(frame, robot):
     return [s for s in check_log(frame, robot).checks if s.certainty != "noted"]
 
 
-@pytest.mark.parametrize("joint, source, share", [(3, 2, 0.2), (4, 3, -0.15)])
+@pytest.mark.parametrize(
+    "joint, source, share", [(3, 2, 0.2), pytest.param(4, 3, -0.15, marks=pytest.mark.slow)]
+)
 def test_a_share_of_another_torque_is_told_alone(joint, source, share):
     frame = make_hidden_effect_log(UR5, "stribeck", joints=[2], **OPTIONS).frame
     mixed = frame[f"tau{joint}"] + share * frame[f"tau{source}"]

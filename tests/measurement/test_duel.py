@@ -42,6 +42,7 @@ def test_no_effect_takes_the_place_of_a_sign(frame):
     assert "another cause" not in told.suspicion
 
 
+@pytest.mark.slow
 def test_what_an_effect_explains_far_better_is_not_told(arm, short):
     """A spring between the joints looks like another sign of the first."""
     assert readings(SPRUNG) == []

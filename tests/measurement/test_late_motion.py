@@ -20,7 +20,7 @@ def late(frame, joint, lag):
     return frame
 
 
-@pytest.mark.parametrize("joint", [2, 4])
+@pytest.mark.parametrize("joint", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_the_motion_of_one_joint_is_late(joint):
     frame = make_hidden_effect_log(
         ROBOT, None, n_trajectories=5, duration=6.0, random_state=4
@@ -34,6 +34,7 @@ def test_the_motion_of_one_joint_is_late(joint):
     assert float(first.split("=")[1]) == pytest.approx(0.025, abs=1.5e-3)
 
 
+@pytest.mark.slow
 def test_play_of_a_gear_is_no_late_motion():
     log = make_hidden_effect_log(ROBOT, "backlash", n_trajectories=5, duration=6.0, random_state=5)
     told = [s.suspicion for s in check_log(log.frame, ROBOT).checks if s.check == "torque_delay"]

@@ -48,6 +48,7 @@ def test_a_payload_makes_no_link_longer():
     assert "lengths" not in {s.check for s in told(frame, ARM)}
 
 
+@pytest.mark.slow
 def test_links_of_an_arm():
     robot = load_ur5()
     frame = make_hidden_effect_log(

@@ -28,7 +28,8 @@ def test_loads_are_no_mistake(loaded):
     assert not [s for s in loaded.checks if s.certainty != "noted"]
 
 
-@pytest.mark.parametrize("joint", [3, pytest.param(5, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("joint", [3, 5])
 def test_a_zero_is_found_beside_them(joint, loaded):
     frame = loaded.frame.assign(**{f"q{joint}": loaded.frame[f"q{joint}"] + 0.9})
     (one,) = [s for s in check_log(frame, loaded.robot).checks if s.certainty != "noted"]

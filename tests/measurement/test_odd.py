@@ -23,7 +23,7 @@ def test_recordings_that_are_alike():
     assert "odd_recording" not in told_of(1.0)
 
 
-@pytest.mark.parametrize("factor", [-1.0, 0.1])
+@pytest.mark.parametrize("factor", [-1.0, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_another_sign_or_scale(factor):
     told = told_of(factor)["odd_recording"]
     assert told.suspicion.startswith(f"in trajectory {RUN} the torque of joint 1")

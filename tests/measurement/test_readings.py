@@ -132,6 +132,7 @@ def test_the_weight_of_a_slider_shows_along_which_axis_gravity_is():
     assert told.check == "reading" and told.remedy.option == "--gravity=0,0,-9.81"
 
 
+@pytest.mark.slow
 def test_a_load_of_some_recordings_hides_no_sign():
     robot = load_scara()
     options = {"n_trajectories": 5, "duration": 6.0, "random_state": 5}

@@ -23,7 +23,14 @@ def made(effect):
     ).frame
 
 
-@pytest.mark.parametrize("effect", [None, "dahl", "lugre"])
+@pytest.mark.parametrize(
+    "effect",
+    [
+        None,
+        pytest.param("dahl", marks=pytest.mark.slow),
+        pytest.param("lugre", marks=pytest.mark.slow),
+    ],
+)
 def test_friction_that_turns_with_its_joint(effect):
     assert "smoothed_torque" not in told_of(made(effect))
 

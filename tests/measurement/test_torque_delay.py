@@ -20,7 +20,14 @@ def test_late_torque(recorded, told_of):
 
 
 @pytest.mark.parametrize(
-    ("missing", "seed"), [(None, 5), ("spring", 7319357), ("payload", 7319354)]
+    ("missing", "seed"),
+    [
+        (None, 5),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in [("spring", 7319357), ("payload", 7319354)]
+        ),
+    ],
 )
 def test_torque_of_one_joint_that_is_late(arm, told_of, missing, seed):
     """A spring that is missing, or loads of single recordings, do not hide its lag."""
@@ -48,6 +55,7 @@ def test_coarse_positions_are_not_late(arm, told_of):
     assert "torque_delay" not in told_of(log.frame.assign(**coarse))
 
 
+@pytest.mark.slow
 def test_a_clock_that_drifts_a_little_is_told_from_a_constant_lag():
     """By 4 ms per second; the lags in the halves of the recordings differ by less than 4 ms."""
     robot = load_ur5()

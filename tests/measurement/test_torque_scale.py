@@ -45,6 +45,7 @@ def test_an_effort_limit_that_the_weight_of_the_links_exceeds_is_what_is_wrong(
     assert "torque_scale" not in told_of(recorded.frame, robot)
 
 
+@pytest.mark.slow
 def test_a_unit_beside_an_effect_as_large_as_the_torque_of_the_bodies():
     robot = load_scara()
     log = make_hidden_effect_log(

@@ -83,6 +83,7 @@ def test_degrees_of_one_joint(short, told_of, only):
     only(told.values(), "position_unit", "certain", "--units q2=deg,dq2=deg/s")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "load, joints, ratio", [(load_ur5, [5], 100.0), (load_planar_arm, [1, 2], 80.0)]
 )

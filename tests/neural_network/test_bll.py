@@ -233,6 +233,7 @@ def test_a_search_that_loses_a_worker_is_bit_equal(client, log, tmp_path):
     np.testing.assert_array_equal(got, wanted)
 
 
+@pytest.mark.slow
 def test_bagging_that_loses_a_worker_is_bit_equal(client, log, tmp_path):
     X, y = log
     member = LSTMRegressor(window=4, hidden_size=4, max_epochs=2)

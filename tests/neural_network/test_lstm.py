@@ -81,6 +81,7 @@ def test_a_gpu_learns_what_a_cpu_learns(kind, log):
     assert errors[0] < 1.2 * errors[1]
 
 
+@pytest.mark.slow
 def test_the_direction_of_velocities_is_an_input():
     rng = np.random.default_rng(0)
     X = pd.DataFrame({"trajectory": np.repeat(np.arange(4), 150), "dq1": rng.normal(size=600)})

@@ -102,7 +102,7 @@ def least_squares_torque(robot, X, y):
     return (flat @ np.linalg.lstsq(flat, y.ravel(), rcond=1e-9)[0]).reshape(y.shape)
 
 
-@pytest.mark.parametrize("residual", [True, False])
+@pytest.mark.parametrize("residual", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_falls_back_on_the_rigid_body_far_from_the_data(arm_log, residual):
     robot, X, y = arm_log
     # at this rate the torque that the network reads without residual=True is soon none

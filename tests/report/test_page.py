@@ -204,7 +204,7 @@ def test_dark_and_light(open_page, fakes):
     assert page.evaluate(background) == "rgb(255, 255, 255)" != dark
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", [pytest.param("light", marks=pytest.mark.slow), "dark"])
 def test_text_has_the_contrast_of_aa(open_page, fakes, scheme):
     page = open_page(fakes.make_diagnosis("unknown"), color_scheme=scheme)
     found = page.evaluate(Path(__file__).with_name("contrast.js").read_text("utf-8"))

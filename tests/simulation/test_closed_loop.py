@@ -68,6 +68,7 @@ def test_motion_is_that_of_the_controlled_model(truth, compensated):
     assert list(motion.columns) == [*reference.columns, "ddq1", "ddq2"]
 
 
+@pytest.mark.slow
 def test_both_integrators_agree_without_dry_friction():
     X = pd.DataFrame(np.random.default_rng(0).uniform(-2, 2, (400, 6)), columns=MOTION)
     y = ROBOT.inverse_dynamics(*X.to_numpy().reshape(-1, 3, 2).transpose(1, 0, 2))

@@ -20,6 +20,7 @@ def loop(sticky_servo):
     return _Arm(model, read_task(model, log, None, servo, PIECE), (), {1}).joints[0].loop
 
 
+@pytest.mark.slow
 def test_together_they_are_what_they_are_alone(loop):
     models = [FRICTION, {**FRICTION, **LAWS["stribeck"]}, {**FRICTION, **LAWS["backlash"]}]
     together = fit_all(loop, models, {})

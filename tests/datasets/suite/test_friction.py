@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Friction of the suite."""
 
+import pytest
 
+
+@pytest.mark.slow
 def test_it_stands_out_of_the_noise(planar_case):
     truth = planar_case("one", "viscous").make().truth
     (effect,) = truth["effects"]
