@@ -24,7 +24,7 @@ PYTEST_ARGS ?=
 OLDEST ?= .venv-oldest
 CORE_TESTS ?= $(addprefix tests/,robots dynamics identification effects evidence metrics \
     model_selection preprocessing neural_network/test_lstm.py neural_network/test_skorch_member.py \
-    committee fleet whole/test_archives.py)
+    committee fleet)
 
 BIN := $(VENV)/bin
 # --no-compile: Python compiles what is imported, which is a small part of these packages
