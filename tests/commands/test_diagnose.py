@@ -142,6 +142,7 @@ def test_servos_without_torque_are_diagnosed_by_their_motion(servo_diagnosed, ca
     assert "--effect stribeck --joints 2" in told
 
 
+@pytest.mark.slow
 def test_a_report_of_servos_is_read_again_with_its_controller(servo_diagnosed, run):
     report = Path(servo_diagnosed[1]).parent / "report.json"
     code, errors = run("add", "--from", report, "--effect", "stribeck", "--joints", "2")

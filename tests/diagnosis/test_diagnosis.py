@@ -54,9 +54,9 @@ ALIKE = (
     *("viscous", "stribeck", "offset", "asymmetric_friction"),
     *("nonlinear_viscous", "temperature_friction"),
 )
-#: Tested always: friction, the tool, and a joint of six.
+#: Tested always: friction of a joint of two, and of six.
 FIRST = [
-    *((kind, "planar arm") for kind in ("stribeck", "payload")),
+    ("stribeck", "planar arm"),
     ("load_dependent_friction", "ur5"),
 ]
 #: Kind, robot and noise: each kind with one noise on two joints, and some of them on six.

@@ -39,7 +39,7 @@ TOGETHER = [
     *(pytest.param((form,), marks=pytest.mark.slow) for form in AMONG_MANY),
     ("step", "bump"),
     pytest.param(("fades after a reversal", "relaxes"), marks=pytest.mark.slow),
-    ("snaps over",),
+    pytest.param(("snaps over",), marks=pytest.mark.slow),
 ]
 LENGTH = {"n_trajectories": 6, "duration": 6.0}
 SHORT = {"n_trajectories": 4, "duration": 4.0}

@@ -2,6 +2,7 @@
 """Explanations in the order of what they do."""
 
 import numpy as np
+import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 
@@ -14,6 +15,7 @@ def test_the_first_of_a_ranking_was_added_and_rivals_score_less(missing):
     assert not rivals or max(rivals) < first.score
 
 
+@pytest.mark.slow
 def test_the_power_of_a_coupling_is_found(found_in):
     log = make_hidden_effect_log(load_planar_arm(), None, noise="low", random_state=3)
     speed = log.X["dq1"].to_numpy() + 0.8 * log.X["dq2"].to_numpy()

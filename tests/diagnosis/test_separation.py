@@ -36,6 +36,7 @@ def test_hysteresis_is_told_apart_by_a_motion_that_the_log_lacked(diagnosis, mot
     assert "both effects were recognised" in motion.sentence
 
 
+@pytest.mark.slow
 def test_the_motion_keeps_the_limits_and_starts_and_ends_at_rest(diagnosis, motion):
     robot, log = diagnosis.problem.robot, diagnosis.problem.signals
     low, high = robot.position_limits.T
@@ -50,6 +51,7 @@ def test_the_motion_keeps_the_limits_and_starts_and_ends_at_rest(diagnosis, moti
         assert np.abs(state[0]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_velocity_and_acceleration_are_the_derivatives(motion):
     step = motion.time[1]
     inner = slice(2, -2)
@@ -60,6 +62,7 @@ def test_velocity_and_acceleration_are_the_derivatives(motion):
         assert np.abs(numeric - dx[inner, 1]).max() < 0.05 * np.abs(dx[:, 1]).max()
 
 
+@pytest.mark.slow
 def test_the_motion_as_a_table(motion):
     table = motion.to_frame()
 
@@ -77,6 +80,7 @@ def test_a_rival_that_contains_the_effect_cannot_be_told_from_it():
     assert motion.sentence.startswith("No motion of joint 2")
 
 
+@pytest.mark.slow
 def test_rivals_that_were_not_compared_are_refused_with_those_that_were(diagnosis):
     with pytest.raises(EffectError, match="compared: .* against .*dahl|compared: dahl"):
         design_separating_motion(diagnosis, "payload", "dahl")

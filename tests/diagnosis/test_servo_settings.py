@@ -132,6 +132,7 @@ def test_a_torque_that_was_measured_has_no_servo(weak):
         diagnose(model, weak.log, torque, effects=SETTINGS)
 
 
+@pytest.mark.slow
 def test_a_doubtful_log_has_no_findings_about_its_servos(servo_log):
     late = servo_log({}, limit=(100.0, 0.5), delay=0.05)
     found = diagnosed(late)

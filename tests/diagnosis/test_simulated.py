@@ -26,6 +26,7 @@ def diagnosis():
     return found
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_models_that_have_not_seen_the_motion(diagnosis):
     X, y = diagnosis.data
     pieces, squares = 0, np.zeros((2, 2))

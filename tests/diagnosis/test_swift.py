@@ -42,6 +42,7 @@ def test_noise_of_accelerations_in_short_windows_is_no_play():
     assert diagnosis.verdict == "complete"
 
 
+@pytest.mark.slow
 def test_rounded_positions_are_no_play():
     robot = load_scara()
     log = make_hidden_effect_log(

@@ -83,6 +83,7 @@ def test_commands_drive_the_model_through_a_controller(servo_log):
     assert np.all(errors[1] < 0.9 * errors[0]) and errors[1][0] < 0.1 * errors[0][0]
 
 
+@pytest.mark.slow
 def test_a_controller_needs_commands_and_the_estimator_that_simulates(servo_log):
     arm, servo, log = servo_log
     torque, model = servo_torque(servo, log), RBDRegressor(arm.robot, arm.effects, "nominal")

@@ -2,10 +2,12 @@
 """Torque of one recording that is late, beside a load that differs between recordings."""
 
 import numpy as np
+import pytest
 
 from skidyn.logs import check_log
 
 
+@pytest.mark.slow
 def test_one_recording_is_late_beside_a_load(loaded):
     frame = loaded.frame.copy()
     run = int(frame["trajectory"].unique()[1])

@@ -47,6 +47,7 @@ def test_the_zero_of_a_joint_in_one_recording():
     assert f"in trajectory {RUN} the zero of joint 2 (joint2) differs by about 3" in told.suspicion
 
 
+@pytest.mark.slow
 def test_a_load_in_half_of_the_recordings_is_no_other_zero(checked):
     log = checked("payload", n_trajectories=6, duration=5.0, random_state=1)
     assert "odd_recording" not in {s.check for s in log.checks}

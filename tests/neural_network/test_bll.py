@@ -202,6 +202,7 @@ def test_grid_search_is_bit_equal(client, log):
     np.testing.assert_array_equal(got, wanted)
 
 
+@pytest.mark.slow
 def test_a_search_that_loses_a_worker_is_bit_equal(client, log, tmp_path):
     X, y = log
 

@@ -343,6 +343,7 @@ def test_copies_files_and_single_precision(model, tmp_path):
     assert np.sqrt(np.mean(error**2)) < 0.05 * Y.std()
 
 
+@pytest.mark.slow
 def test_two_processes(model, scores_by_hand, fresh_processes):
     X = table_of(model)
     scores = cross_val_score(model, X, Y, cv=SPLITS, n_jobs=2)

@@ -14,6 +14,7 @@ def test_joints_count_from_one_and_values_are_those_of_json(written):
     assert effect["formula"] == "tau0" and "trajectories" not in effect
 
 
+@pytest.mark.slow
 def test_trajectories_are_those_of_the_log(once):
     (effect,) = once.truth["effects"]
     assert set(effect["joints"]) <= {1, 2} and effect["variables"] == []

@@ -3,7 +3,10 @@
 
 import json
 
+import pytest
 
+
+@pytest.mark.slow
 def test_it_stands_out_of_the_noise(written):
     truth = json.loads(written.truth.read_text())
     (effect,) = truth["effects"]

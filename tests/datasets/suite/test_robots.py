@@ -4,6 +4,7 @@
 from collections import Counter
 
 import numpy as np
+import pytest
 
 from skidyn.datasets import hidden_effect_suite, load_planar_arm
 from skidyn.robots import Robot
@@ -15,6 +16,7 @@ def test_several_robots_are_drawn():
     assert min(drawn.values()) >= 10
 
 
+@pytest.mark.slow
 def test_the_description_of_a_case_is_that_of_its_robot(written):
     robot, own = Robot.from_urdf(written.case / "robot.urdf"), load_planar_arm()
     assert robot.joint_names == own.joint_names

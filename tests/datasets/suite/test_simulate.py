@@ -4,8 +4,10 @@
 import json
 
 import numpy as np
+import pytest
 
 
+@pytest.mark.slow
 def test_the_torque_of_a_hidden_effect_is_what_its_truth_says(empty, written):
     (effect,) = json.loads(written.truth.read_text())["effects"]
     (joint,), (size,) = effect["joints"], effect["parameters"]["tau0"]

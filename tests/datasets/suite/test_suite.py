@@ -39,6 +39,7 @@ def test_only_what_was_asked_for():
         hidden_effect_suite(1, 0)
 
 
+@pytest.mark.slow
 def test_files_say_nothing_of_the_truth(written):
     names = sorted(p.name for p in written.case.iterdir())
     assert names == ["log.parquet", "meta.json", "robot.urdf"]
