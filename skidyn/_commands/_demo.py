@@ -9,7 +9,7 @@ from typing import Any
 
 from skidyn._commands._arguments import Page, command
 from skidyn._commands._output import print_json, rmse_per_joint, working, write_page
-from skidyn._text import digits
+from skidyn._text import digits, joints_told, raised
 
 #: Speed in rad/s above which a joint moves.
 MOVING = 0.05
@@ -17,7 +17,7 @@ MOVING = 0.05
 DESCRIPTION = """\
 Run the whole loop on a simulated Panda arm with two hidden effects: compare, see where the model
 fails, identify the missing effects, add them, and evaluate the better model on two trajectories
-that were put aside.
+that were put aside. At the end the hidden effects are told.
 
   skidyn demo --html demo.html
 """
@@ -62,9 +62,26 @@ def run(options: argparse.Namespace) -> None:
         if row["speaks"]:
             a, b = (digits(errors[row["joint"] - 1]) for errors in (before, after))
             say(f"   {row['name']} (joint {row['joint']}): {a} → {b} {row['unit']}")
+    say("5. What was hidden:")
+    for effect in log.truth:
+        say(f"   {_told(effect)}")
     write_page(diagnosis, options.html, {"log": "simulated by skidyn demo"})
     page = str(Path(options.html).resolve())
     if options.json:
         kinds = [finding.kind for finding in diagnosis.findings]
         print_json({"found": kinds, "before": before, "after": after, "html": page})
-    say(f"5. The report: {page}")
+    say(f"6. The report: {page}")
+
+
+def _told(effect: dict[str, Any]) -> str:
+    """A hidden effect with its joints, and its parameters as far as the catalogue has them."""
+    from skidyn.effects import get_effect
+
+    kind = get_effect(effect["kind"])
+    units = kind.units()
+    sizes = (
+        f"{name} = {', '.join(map(digits, values))} {raised(units[name])}".replace("-", "−")
+        for name, values in effect["parameters"].items()
+        if name in units
+    )
+    return f"{kind.title} on {joints_told(effect['joints'])}: {', '.join(sizes)}"
