@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulate logs of a suite and prepare them: ``python _make.py FOLDER SEED NUMBER ...``."""
+"""Simulate and prepare logs of a suite: ``python _make.py FOLDER SEED CONTENTS NUMBER ...``."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from skidyn.datasets import hidden_effect_suite
 
 def main() -> None:
     warnings.simplefilter("ignore")
-    folder, seed, numbers = Path(sys.argv[1]), int(sys.argv[2]), [int(w) for w in sys.argv[3:]]
-    suite = hidden_effect_suite(seed, max(numbers) + 1)
+    folder, seed, contents = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3].split(",")
+    numbers = [int(word) for word in sys.argv[4:]]
+    suite = hidden_effect_suite(seed, max(numbers) + 1, contents=contents)
     for number in numbers:
         case = suite[number]
         if not (folder / "truth" / f"{case.name}.json").exists():

@@ -2,6 +2,7 @@
 """Generate the suite, run every peer on the same logs, and print the scores.
 
     python benchmarks/suite/run.py FOLDER [--seed 2026] [--logs 60] [--errors 16] [--peers NAMES]
+                                   [--contents once]
     python benchmarks/suite/run.py --table benchmarks/suite/results.json
 
 A peer is a file of ``benchmarks/peers`` with ``PACKAGE`` and ``answer(log, robot) -> dict``; add
@@ -10,7 +11,8 @@ your own. It runs in processes of its own, of one thread each and ``--jobs`` at 
 (peers need no skidyn, but for its own). FOLDER receives ``cases`` (what a tool may see), ``truth``,
 ``prepared``, ``answers/PEER``, ``models/PEER`` and ``simulated``; what is there is not made again,
 so that an interrupted run goes on. Errors on held-out trajectories and of the motion, which take a
-second fit of every peer, are computed for the first ``--errors`` logs. Answers of a tool that is no
+second fit of every peer, are computed for the first ``--errors`` logs. ``--contents`` draws only
+such logs (another draw than these logs of the whole suite). Answers of a tool that is no
 Python: one JSON per case into ``FOLDER/answers/NAME``, then ``--peers NAME``. ``--keep`` writes the
 scores, and ``--table`` prints what was kept.
 """
@@ -63,7 +65,7 @@ def chunks(cases: list[Path]) -> list[list[Path]]:
     return [cases[k : k + CHUNK] for k in range(0, len(cases), CHUNK)]
 
 
-def make(folder: Path, suite: list[SuiteCase], jobs: int) -> list[dict]:
+def make(folder: Path, suite: list[SuiteCase], contents: str, jobs: int) -> list[dict]:
     """Truths of the cases, which are simulated and prepared for peers unless they are there."""
     missing = [
         str(case.entropy[1])
@@ -71,7 +73,7 @@ def make(folder: Path, suite: list[SuiteCase], jobs: int) -> list[dict]:
         if not (folder / "prepared" / f"{case.name}.npz").exists()
         or not (folder / "truth" / f"{case.name}.json").exists()
     ]
-    words = [sys.executable, HERE / "_make.py", folder, str(suite[0].entropy[0])]
+    words = [sys.executable, HERE / "_make.py", folder, str(suite[0].entropy[0]), contents]
     in_processes([[*words, *some] for some in chunks(missing)], jobs)
     return [json.loads((folder / "truth" / f"{case.name}.json").read_text()) for case in suite]
 
@@ -319,6 +321,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--seed", type=int, default=2026)
     parser.add_argument("--logs", type=int, default=60)
+    parser.add_argument("--contents", default=",".join(CONTENTS), help="all by default")
     parser.add_argument("--errors", type=int, default=16, help="number of logs with errors")
     parser.add_argument("--peers", default="", help="all by default, skidyn's first")
     parser.add_argument("--python", default=sys.executable, help="of the peers but skidyn's")
@@ -336,9 +339,10 @@ def main() -> None:
         parser.error("FOLDER is missing: where the logs and answers go")
     every = sorted((p.stem for p in PEERS.glob("*.py")), key=lambda n: (n[:6] != "skidyn", n))
     peers = options.peers.split(",") if options.peers else every
-    suite = hidden_effect_suite(options.seed, options.logs)
+    contents = options.contents.split(",")
+    suite = hidden_effect_suite(options.seed, options.logs, contents=contents)
     start = time.time()
-    truths = make(options.folder, suite, options.jobs)
+    truths = make(options.folder, suite, options.contents, options.jobs)
     made = _processor()
     pythons = {p: sys.executable if p.startswith("skidyn") else options.python for p in peers}
     names = [case.name for case in suite]
