@@ -13,6 +13,7 @@ def data():
     return X, X[:, 1:] @ rng.normal(size=(8, 2)) + 0.5 * rng.normal(size=(60, 2))
 
 
+@pytest.mark.slow
 def test_more_trajectories_help_and_the_curve_is_reproducible(data):
     kwargs = {"trajectory": 0, "cv": 3, "n_trajectories": [1, 4], "random_state": 0}
     curve = trajectory_learning_curve(Ridge(), *data, **kwargs)

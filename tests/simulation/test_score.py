@@ -59,6 +59,7 @@ def test_one_piece_is_no_evidence(log, models):
         judge_by_simulation(*models, log.X[test], log.y[test], horizon=None)
 
 
+@pytest.mark.slow
 def test_motion_that_explodes_is_infinite_not_silent(log, models):
     test = log.frame["trajectory"] == 4
     broken = RBDRegressor(log.robot, [Term("spring", (1,))]).fit(log.X, log.y)

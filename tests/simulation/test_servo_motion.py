@@ -33,6 +33,7 @@ def fitted(servo):
     )
 
 
+@pytest.mark.slow
 def test_stiction_is_named_on_its_joint_with_its_size(diagnosis):
     (found,) = diagnosis.servo_motion
     assert (found.kind, found.joint) == ("stribeck", 2)
@@ -53,6 +54,7 @@ def test_nothing_is_named_where_the_gain_is_wrong(sticky_servo):
     assert explain_servo_motion(fitted(sticky_servo), sticky_servo.log, wrong, joints=[2]) == []
 
 
+@pytest.mark.slow
 def test_a_diagnosis_keeps_what_the_motion_names(diagnosis):
     (found,) = diagnosis.servo_motion
     assert diagnosis.to_dict()["servo_motion"] == [found.to_dict()]
