@@ -118,6 +118,7 @@ def test_effects_found_on_a_pipeline_return_a_pipeline(steps, before):
     assert isinstance(search.best_estimator_, Pipeline)
 
 
+@pytest.mark.slow
 def test_weights_reach_the_steps_of_a_corrected_pipeline(tmp_path):
     weight = np.linspace(0.5, 1.5, len(LOG.X))
     given = make_pipeline(DropKeys(), Ridge()).fit(LOG.X, LOG.y)

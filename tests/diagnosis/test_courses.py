@@ -92,6 +92,7 @@ def test_nothing_changes_where_nothing_is_hidden(motion):
     assert not found_with(motion, 0.0)
 
 
+@pytest.mark.slow
 def test_the_diagnosis_states_how_it_changes(motion):
     carried = np.isin(motion.trajectory, [2, 3, 6]) * (1 - 0.6 * passed(motion))
     measured = measured_with(motion, of_load(motion) * carried[:, None])

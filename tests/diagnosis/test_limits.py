@@ -42,6 +42,7 @@ def test_no_limit_is_larger_than_the_torque_itself(log, limits):
             assert limit.largest_hidden < size[joint - 1], limit.sentence
 
 
+@pytest.mark.slow
 def test_an_effect_of_twice_the_limit_is_found_and_one_of_a_quarter_is_not(log, limits):
     limit = limits["spring", 2]
     found = []

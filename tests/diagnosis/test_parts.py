@@ -57,7 +57,11 @@ def falling(log):
 
 
 @pytest.mark.parametrize(
-    ("torque", "kinds"), [(rising, {"end_stop", "nonlinear_spring"}), (falling, {"stribeck"})]
+    ("torque", "kinds"),
+    [
+        pytest.param(rising, {"end_stop", "nonlinear_spring"}, marks=pytest.mark.slow),
+        (falling, {"stribeck"}),
+    ],
 )
 def test_is_named_with_its_recordings(diagnosed, torque, kinds):
     (finding,) = diagnosed(torque, PART).findings

@@ -39,7 +39,7 @@ def test_scikit_learn_contract(estimator, check):
     check(estimator)
 
 
-@pytest.mark.parametrize("resample", ["trajectory", "window"])
+@pytest.mark.parametrize("resample", ["trajectory", pytest.param("window", marks=pytest.mark.slow)])
 def test_bit_equal_for_any_number_of_processes(log, resample):
     X, y = log
     # more members than are trained side by side
