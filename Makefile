@@ -18,9 +18,9 @@ PYTHON ?= python3
 TORCH ?= torch==2.13.0
 VENV ?= .venv
 PYTEST_ARGS ?=
-# what make compatibility installs into, and runs ("tests" for everything, which takes long): every
-# package that other packages are called by, once. An older version fails at the first call of what
-# it lacks, and not by the size of a robot or the accuracy of an answer.
+# what make compatibility installs into, and runs (-m "" tests for everything, which takes long):
+# every package that other packages are called by, once. An older version fails at the first call of
+# what it lacks, and not by the size of a robot or the accuracy of an answer.
 OLDEST ?= .venv-oldest
 CORE_TESTS ?= $(addprefix tests/,robots dynamics identification effects evidence metrics \
     model_selection preprocessing neural_network/test_lstm.py neural_network/test_skorch_member.py \

@@ -12,9 +12,9 @@ your own. It runs in processes of its own, of one thread each and ``--jobs`` at 
 ``prepared``, ``answers/PEER``, ``models/PEER`` and ``simulated``; what is there is not made again,
 so that an interrupted run goes on. Errors on held-out trajectories and of the motion, which take a
 second fit of every peer, are computed for the first ``--errors`` logs. ``--contents`` draws only
-such logs (another draw than these logs of the whole suite). Answers of a tool that is no
-Python: one JSON per case into ``FOLDER/answers/NAME``, then ``--peers NAME``. ``--keep`` writes the
-scores, and ``--table`` prints what was kept.
+such logs (another draw than these logs of the whole suite, for a FOLDER of its own). Answers of a
+tool that is no Python: one JSON per case into ``FOLDER/answers/NAME``, then ``--peers NAME``.
+``--keep`` writes the scores, and ``--table`` prints what was kept.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from typing import Any
 
 from skidyn._commands._arguments import Page, command
 from skidyn._commands._output import print_json, rmse_per_joint, working, write_page
-from skidyn._text import digits, joints_told, raised
+from skidyn._text import digits, joints_told, measure
 
 #: Speed in rad/s above which a joint moves.
 MOVING = 0.05
@@ -80,8 +80,9 @@ def _told(effect: dict[str, Any]) -> str:
     kind = get_effect(effect["kind"])
     units = kind.units()
     sizes = (
-        f"{name} = {', '.join(map(digits, values))} {raised(units[name])}".replace("-", "−")
+        measure(name, value, units[name])
         for name, values in effect["parameters"].items()
         if name in units
+        for value in values
     )
     return f"{kind.title} on {joints_told(effect['joints'])}: {', '.join(sizes)}"
