@@ -35,6 +35,7 @@ class ReconsideringSearch(JudgingSearch):
         offered = ranking
         ranking = list(ranking)
         traced: set[int] = set()
+        shadows: set[tuple[str, tuple[int, ...]]] = set()
         while (best := self.pick(ranking)) is not None:
             ranking.remove(best)
             if self._richer_known(best):
@@ -49,7 +50,10 @@ class ReconsideringSearch(JudgingSearch):
                 judged, is_piece = self.without_pieces(judged)
                 traced |= set(judged.joints) if is_piece else set()
                 if is_piece or self.shadow(judged):
-                    judged = self._beside_another_kind(judged)
+                    # one kind in different parts of the log is one competition
+                    own = judged.kind, judged.joints
+                    judged = None if own in shadows else self._beside_another_kind(judged)
+                    shadows.add(own)
             if judged is not None:
                 judged = self._offset_later(judged)
                 rivals = rivals_among(judged, offered)
