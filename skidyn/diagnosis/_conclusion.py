@@ -31,7 +31,13 @@ from skidyn.diagnosis._findings import (
 )
 from skidyn.diagnosis._floor import predictable_share
 from skidyn.diagnosis._held_out import held_out_residual
-from skidyn.diagnosis._hypothesis import UNKNOWN, SearchResult, found_terms, on_samples
+from skidyn.diagnosis._hypothesis import (
+    UNKNOWN,
+    Hypothesis,
+    SearchResult,
+    found_terms,
+    on_samples,
+)
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._limits import Limit
 from skidyn.diagnosis._noise import sensor_noise
@@ -53,7 +59,7 @@ from skidyn.diagnosis._rule import (
 )
 from skidyn.diagnosis._search_state import replace_torque
 from skidyn.diagnosis._unknown import UnknownTorque, describe_unknowns
-from skidyn.diagnosis._withdrawal import drop_of, guess, slight, to_withdraw, without
+from skidyn.diagnosis._withdrawal import drop_of, guess, slight, to_withdraw, useless, without
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 
@@ -94,6 +100,7 @@ def conclude(
     """
     robot = problem.robot
     assert robot is not None
+    tried_last: list[Hypothesis] = []
     while True:
         comparisons, history, averages, residual, own_torque = _steps(
             problem, result, torque, sliding
@@ -105,7 +112,16 @@ def conclude(
             for c, entry, average in zip(comparisons, history, averages, strict=True)
         ]
         noise = sensor_noise(problem.signals, residual), position_noise(problem, result.fit)
-        wrong = to_withdraw(problem, result, errors, noise, least_drop, fixed)
+        needless = useless(problem, result, errors, noise, least_drop)
+        if needless is not None and all(
+            h is not needless[0] for h in [*tried_last, result.findings[-1]]
+        ):
+            # Without a later finding it may increase the error that it reduces beside it.
+            tried_last.append(needless[0])
+            order = sorted(result.findings, key=lambda h: h is needless[0])
+            result = replace(result, findings=order)
+            continue
+        wrong = needless or to_withdraw(problem, result, fixed)
         if wrong is None:
             break
         result = without(problem, result, *wrong)
@@ -340,6 +356,7 @@ def _sure(
         finding.margin,
         float(parts.inflation[joints].max()),
         max(f.error_drop for f in findings if f.kind == finding.kind),
+        q_value=min(f.q_value or 0.0 for f in findings if f.kind == finding.kind),
         lead=lead,
         nameless=finding.kind != UNKNOWN and (beside or bool(parts.material[joints].any())),
         whole_recordings=whole,

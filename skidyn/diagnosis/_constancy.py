@@ -9,7 +9,7 @@ time. An effect that differs significantly, by more than a small share of what i
 sure.
 
 The torque of an effect with another formula than the given one is not removed entirely, and what is
-left may look like a second effect. Such a second effect is less sure if the first one, times
+left may look like a second, smaller effect. Such a second effect is less sure if the first one, times
 functions of time and motion, would explain most of it.
 
 References
@@ -89,21 +89,21 @@ def changes(problem: Problem, result: SearchResult) -> dict[str, Change]:
             size = result.fit.coefficients[own[term]]
             of_kind[term] = {j: block @ size for j, block in blocks[term].items()}
     tests: dict[str, list[tuple[float, float]]] = {}
-    explained, instead = {}, {}
+    without, drops = {}, {}
     for kind, of_kind in torques.items():
         rest = [rows for term, rows in blocks.items() if term not in of_kind]
-        without = Tester(bare, rest, sigma, target)
-        explained[kind] = sum(without.test(blocks[term]).drop for term in of_kind)
-        instead[kind] = _instead(bare, torques, kind, without, explained[kind])
+        without[kind] = Tester(bare, rest, sigma, target)
+        drops |= {term: without[kind].test(blocks[term]).drop for term in of_kind}
         variants = [v for t, torque in of_kind.items() for v in _variants(bare, t, torque, blocks)]
         tests[kind] = [(test.chance, test.drop) for test in map(whole.test, variants)]
+    explained = {kind: sum(drops[t] for t in of_kind) for kind, of_kind in torques.items()}
     level = CHANGE_LEVEL / max(1, sum(map(len, tests.values())))
     least = np.finfo(float).tiny
     return {
         kind: Change(
             max((drop for chance, drop in found if chance < level), default=0.0)
             / max(explained[kind], least),
-            instead[kind],
+            _instead(bare, torques, kind, without[kind], drops),
         )
         for kind, found in tests.items()
     }
@@ -114,25 +114,24 @@ def _instead(
     torques: dict[str, dict[Term, _Block]],
     kind: str,
     without: Tester,
-    explained: float,
+    drops: dict[Term, float],
 ) -> str | None:
-    """Kind of another effect on the same joints whose change explains most of what a kind does."""
+    """Kind of another effect on the same joints whose change explains most of what a kind does.
+
+    A formula does not leave more than it removes.
+    """
     joints = {j for torque in torques[kind].values() for j in torque}
-    drops = {
-        other: max(
-            (
-                without.test(block).drop
-                for torque in of_kind.values()
-                if joints & set(torque)
-                for block in _reshaped(problem, torque)
-            ),
-            default=0.0,
-        )
-        for other, of_kind in torques.items()
-        if other != kind
-    }
-    best = max(drops, key=lambda other: drops[other], default=None)
-    return best if best is not None and drops[best] > CHANGE_INSTEAD * explained else None
+    explained = sum(drops[term] for term in torques[kind])
+    best, most = None, CHANGE_INSTEAD * explained
+    for other, of_kind in torques.items():
+        there = {term: torque for term, torque in of_kind.items() if joints & set(torque)}
+        if other == kind or sum(drops[term] for term in there) < explained:
+            continue
+        for block in (b for torque in there.values() for b in _reshaped(problem, torque)):
+            drop = without.test(block).drop
+            if drop > most:
+                best, most = other, drop
+    return best
 
 
 def _variants(

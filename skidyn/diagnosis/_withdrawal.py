@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Withdrawal of findings: everything that was found is judged again beside all others.
 
-A finding is withdrawn if it does not reduce the error of samples (:func:`to_withdraw`), if its size
-may be zero or cannot be, or if it is more likely wrong than right (:func:`guess`). One that is too
+A finding is withdrawn if it does not reduce the error of samples (:func:`useless`), if its size may
+be zero or cannot be (:func:`to_withdraw`), or if it is more likely wrong than right (:func:`guess`). One that is too
 small to matter stays in the completed model without being listed (:func:`slight`).
 """
 
@@ -37,14 +37,30 @@ Withdrawal = tuple[Hypothesis, list[Candidate]]
 
 
 def to_withdraw(
+    problem: Problem, result: SearchResult, intervals: dict[Term, dict[str, Any]]
+) -> Withdrawal | None:
+    """The last finding with terms that are vague or impossible, and these terms.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds on which effects are judged.
+    result : SearchResult
+        Findings and the final fit.
+    intervals : dict
+        Parameters of every term, with intervals for fixed shapes.
+    """
+    return _vague(problem, result.findings, intervals) or _impossible(result.findings, intervals)
+
+
+def useless(
     problem: Problem,
     result: SearchResult,
     errors: Sequence[Sequence[Sequence[float]]],
     noise: tuple[Array, Array],
     least: float,
-    intervals: dict[Term, dict[str, Any]],
 ) -> Withdrawal | None:
-    """The last finding with terms that are useless, vague or impossible, and these terms.
+    """The last finding with terms that do not reduce the error of samples, and these terms.
 
     Parameters
     ----------
@@ -58,25 +74,9 @@ def to_withdraw(
         Noise of the torque sensor and of positions, N m or N.
     least : float
         Share of the error of samples that a finding must remove.
-    intervals : dict
-        Parameters of every term, with intervals for fixed shapes.
-    """
-    return (
-        _useless(problem, result, errors, noise, least)
-        or _vague(problem, result.findings, intervals)
-        or _impossible(result.findings, intervals)
-    )
 
-
-def _useless(
-    problem: Problem,
-    result: SearchResult,
-    errors: Sequence[Sequence[Sequence[float]]],
-    noise: tuple[Array, Array],
-    least: float,
-) -> Withdrawal | None:
-    """The last finding with terms that do not reduce the error of samples, and these terms.
-
+    Notes
+    -----
     They reduced the error of averaged rows. The squared error, which few samples may dominate, and
     the mean absolute one are both used; terms that do not lower the squared error at all are
     included. Terms of some recordings need to remove less, by the share of samples of these.

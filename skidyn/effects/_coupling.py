@@ -18,6 +18,8 @@ _RATIO = Shape(
 #: Largest ratio, in units of the two joints: beyond it an effect of the second joint alone fits.
 #: Between a slider and a rotary joint, a screw for example, the unit itself is only a guess.
 LARGEST_RATIO, GUESSED = 10.0, (0.1, 1.0, 10.0)
+#: Further ratios of common gears, of which friction is tried: its sign depends on them.
+GEARS = (0.5, 2.0)
 _GAUTIER = "Janot, Vandanjon, Gautier (2014), IEEE TCST 22(1), 132-145 (TX40 wrist)."
 
 
@@ -87,6 +89,15 @@ class CoupledFriction(_PairEffect):
         speed = signals.dq[:, i] + ratio * signals.dq[:, j]
         drag = np.sign(speed) * np.abs(speed) ** form.get("power", 1.0)
         return np.column_stack([np.tanh(speed / (SIGN_BLUR * signals.unit[i])), drag])
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        unit = self.travel(signals, joints, {})
+        plain = [{"ratio": sign * gear * unit} for gear in GEARS for sign in (1.0, -1.0)]
+        apart = [{"ratio": gear * unit, "differential": 1.0} for gear in GEARS]
+        # a differential is the same with either sign
+        tried = super().grid(signals, joints)
+        once = [s for s in tried if "differential" not in s or s["ratio"] > 0]
+        return [*once, *plain, *apart]
 
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
