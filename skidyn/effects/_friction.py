@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -63,6 +65,23 @@ class Coulomb(Effect):
         return signals.sign[:, [joint]]
 
 
+#: Range of the speed at which friction saturates, in units of the joint.
+SATURATING = (0.02, 3.0)
+
+
+def saturated(speed: Array, at: float | None) -> Array:
+    """A speed that grows up to a limit only, in the same unit; as it is without a limit.
+
+    Parameters
+    ----------
+    speed : ndarray of shape (n_samples,), rad/s or m/s
+        Not negative.
+    at : float or None, rad/s or m/s
+        Its limit.
+    """
+    return speed if at is None else at * -np.expm1(-speed / at)
+
+
 class Stribeck(Effect):
     """Extra dry friction at low speed that fades as the lubricant film builds up.
 
@@ -97,8 +116,9 @@ class AsymmetricFriction(Effect):
     """The part of friction that differs between the directions of motion.
 
     It grows with the speed, or with another ``power`` of it (1 if the shape has none); speeds are
-    in units of 1 rad/s or 1 m/s, so that the unit of the coefficient is the same. With a ``side``
-    (1 or -1) it acts only in one direction of motion.
+    in units of 1 rad/s or 1 m/s, so that the unit of the coefficient is the same. Or it grows up to
+    a speed, ``saturating``, as ``v (1 - exp(-|dq| / v))``. With a ``side`` (1 or -1) it acts only in
+    one direction of motion.
     """
 
     kind = "asymmetric_friction"
@@ -106,12 +126,18 @@ class AsymmetricFriction(Effect):
     title = "Direction-dependent friction"
     formula = r"\Delta F_v\,|\dot q|^p + \Delta F_c"
     coefficients = (Coefficient("dFv", "N m s/rad"), Coefficient("dFc", "N m"))
-    shapes = (Shape("power", "1", (), 0.3, 3.0, scales=False),)
+    shapes = (
+        Shape("power", "1", (), 0.3, 3.0, scales=False),
+        Shape("saturating", "rad/s", (), *SATURATING),
+    )
     forms = (
         {"power": 2.0},
         {"power": 0.5},
         {"power": 2.0, "side": 1.0},
         {"power": 2.0, "side": -1.0},
+        {"saturating": 0.3},
+        {"saturating": 0.3, "side": 1.0},
+        {"saturating": 0.3, "side": -1.0},
     )
     simplicity = 11
     rivals = ("offset", "viscous")
@@ -121,24 +147,42 @@ class AsymmetricFriction(Effect):
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         dq, side = signals.dq[:, joint], shape.get("side")
         speed = np.abs(dq) if side is None else np.maximum(0.0, side * dq)
+        speed = saturated(speed, shape.get("saturating"))
         return np.column_stack([speed ** shape.get("power", 1.0), np.ones(signals.n_samples)])
 
 
 class NonlinearViscous(Effect):
-    """Friction that grows with a power of velocity other than one."""
+    """Friction that grows with a power of velocity other than one.
+
+    Or it grows up to a speed, ``saturating``, as ``v (1 - exp(-|dq| / v))`` and powers of it, like
+    an arctangent or a hyperbolic tangent. It does not fall with the speed then, which would be
+    Stribeck friction.
+    """
 
     kind = "nonlinear_viscous"
     drawn_against = "dq"
     title = "Nonlinear viscous friction"
     formula = r"c\,|\dot q|^p\,\mathrm{sign}(\dot q)"
     coefficients = (Coefficient("c", "N m (s/rad)^p"),)
-    shapes = (Shape("power", "1", (0.5, 2.0, 3.0), 0.1, 4.5, scales=False, limit_kind="coulomb"),)
+    shapes = (
+        Shape("power", "1", (0.5, 2.0, 3.0), 0.1, 4.5, scales=False, limit_kind="coulomb"),
+        Shape("saturating", "rad/s", (), *SATURATING, limit_kind="coulomb"),
+    )
+    forms = ({"saturating": 0.2}, {"saturating": 0.6})
     simplicity = 9
     rivals = ("viscous", "stribeck", "coulomb")
     separating_motion = "sweeps that reach the highest speed the joint allows"
     reference = "Waiboer, Aarts, Jonker (2005), Multibody Dynamics, ECCOMAS."
 
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        (plain,) = self.coefficients
+        return (replace(plain, sign=1),) if "saturating" in shape else (plain,)
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        tried = super().grid(signals, joints)
+        return [s for s in tried if "saturating" not in s or s["power"] < 1.0]
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        speed = np.abs(signals.dq[:, joint])
+        speed = saturated(np.abs(signals.dq[:, joint]), shape.get("saturating"))
         friction: Array = speed ** shape["power"] * signals.sign[:, joint]
         return friction[:, None]

@@ -38,6 +38,9 @@ LEAST, SURE, BESIDE, FINALISTS = 15.0, 40.0, 0.3, 4
 CONFIRMED = 2 * DECISIVE
 #: Difference of gains up to which two axes are the same.
 TIED = 0.1
+#: Largest constant torque that the stated bodies leave about another axis, relative to the present
+#: one and to the residual: a weight that the stated axis explains would be chance.
+CONSTANT = 2.0
 
 
 @dataclass(frozen=True)
@@ -156,6 +159,7 @@ def find_axes(fits: Fits) -> list[Axis]:
         return []  # bodies of mimic joints have no separate columns
     few = fits.with_loads(False).few
     rough = few.nominal(Reading(), 1)
+    most = CONSTANT * max(fits.offset(Reading()), 1.0)
     every = np.vstack([np.eye(3), -np.eye(3)])
     tried: list[tuple[float, int, int, Array]] = []
     for body, axis in enumerate(tree.axes):
@@ -170,7 +174,7 @@ def find_axes(fits: Fits) -> list[Axis]:
         other = fits.of(turned(robot, body, direction))
         after = other.identified(Reading())
         confirmed, own = _gained(before, after)
-        if confirmed < DECISIVE:
+        if confirmed < DECISIVE or other.offset(Reading()) > most:
             continue
         gain, drop = _gained(here, other.nominal(Reading()))
         joint = int(tree.coordinates[body])
@@ -178,9 +182,9 @@ def find_axes(fits: Fits) -> list[Axis]:
         decided = gain >= WEAKEST and confirmed >= CONFIRMED and own >= HALF
         if stated or (decided and after.margin(before)[joint] >= 0):
             found.append(Axis(joint, direction, other, gain, confirmed, max(drop, own)))
-    most = max((axis.total for axis in found), default=0.0)
+    best = max((axis.total for axis in found), default=0.0)
     return sorted(
-        (axis for axis in found if axis.total > most - TIED), key=lambda a: a.likely, reverse=True
+        (axis for axis in found if axis.total > best - TIED), key=lambda a: a.likely, reverse=True
     )
 
 
