@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -68,7 +69,7 @@ class CoupledFriction(_PairEffect):
 
     The viscous part may grow with another ``power`` of the speed (1 where the shape has none), in
     units of 1 rad/s or 1 m/s. A ``differential`` has two such shafts, one that turns with the sum
-    and one with the difference of the velocities.
+    and one with the difference of the velocities, with equal or ``unequal`` friction.
     """
 
     kind = "coupled_friction"
@@ -77,7 +78,12 @@ class CoupledFriction(_PairEffect):
     formula = r"F_v\,\dot x + F_c\,\mathrm{sign}\,\dot x,\quad \dot x = \dot q_i + r\,\dot q_j"
     coefficients = (Coefficient("Fc", "N m", sign=1), Coefficient("Fv", "N m s/rad", sign=1))
     shapes = (_RATIO, Shape("power", "1", (), 0.3, 3.0, scales=False))
-    forms = ({"power": 2.0}, {"power": 0.5}, {"differential": 1.0})
+    forms = (
+        {"power": 2.0},
+        {"power": 0.5},
+        {"differential": 1.0},
+        {"differential": 1.0, "unequal": 1.0},
+    )
     simplicity = 17
     rivals = ("viscous", "coulomb")
     separating_motion = "the two joints moved together, then against each other"
@@ -105,8 +111,18 @@ class CoupledFriction(_PairEffect):
         columns = super().torque_columns(signals, joints, **shape)
         if "differential" in shape:
             other = super().torque_columns(signals, joints, **shape | {"ratio": -shape["ratio"]})
-            return {j: block + other[j] for j, block in columns.items()}
+            apart = "unequal" in shape
+            return {
+                j: np.hstack([block, other[j]]) if apart else block + other[j]
+                for j, block in columns.items()
+            }
         return columns
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        if "unequal" not in shape:
+            return self.coefficients
+        second = (replace(c, name=f"{c.name}2") for c in self.coefficients)
+        return (*self.coefficients, *second)
 
 
 class CoupledInertia(_PairEffect):
