@@ -134,7 +134,7 @@ def confidence(
     changes = change > CHANGE_SHARE
     logit += CHANGING * float(np.log10(max(change / CHANGE_SHARE, 1.0)))
     doubtful = not has_name or stays or changes or instead
-    doubtful |= rivalled and margin < ABOVE
+    doubtful |= rivalled and (margin < ABOVE or lead < SEPARATES)
     return min(MOST_IN_DOUBT if doubtful else MOST, float(1 / (1 + np.exp(-logit))))
 
 

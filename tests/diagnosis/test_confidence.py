@@ -22,6 +22,7 @@ def test_a_clear_name_is_sure_but_never_certain():
         {"stays": True},
         {"change": 0.1},
         {"instead": True},
+        {"q_value": 1e-4},
     ],
 )
 def test_what_speaks_against_a_name_lowers_it(against):
@@ -54,6 +55,7 @@ def test_that_something_has_no_name_is_less_sure():
 def test_a_name_that_leaves_most_of_the_error_is_not_sure():
     noise = np.array([0.1, 0.1])
     assert mostly_stays(np.array([0.2, 0.1]), np.array([0.19, 0.1]), noise)
+    assert not mostly_stays(np.array([0.15, 0.1]), np.array([0.14, 0.1]), noise)  # coloured
     assert not mostly_stays(np.array([0.2, 0.1]), np.array([0.12, 0.1]), noise)
     assert not mostly_stays(np.array([0.105, 0.1]), np.array([0.104, 0.1]), noise)  # all is noise
     assert confidence(1.0, 1.0, 0.3, stays=True) < 0.9

@@ -73,6 +73,25 @@ def test_a_differential_has_a_shaft_for_the_sum_and_one_for_the_difference(signa
         np.testing.assert_allclose(both[joint], one[joint] + other[joint])
 
 
+def test_the_shafts_of_a_differential_may_have_unequal_friction(signals):
+    effect = get_effect("coupled_friction")
+    shape = {"ratio": 0.5, "differential": 1.0, "unequal": 1.0}
+    apart = effect.torque_columns(signals, (0, 1), **shape)
+    for joint in (0, 1):
+        shafts = [effect.torque_columns(signals, (0, 1), ratio=r)[joint] for r in (0.5, -0.5)]
+        np.testing.assert_allclose(apart[joint], np.hstack(shafts))
+    names = [c.name for c in effect.coefficients_of(shape)]
+    assert names == ["Fc", "Fv", "Fc2", "Fv2"]
+
+
+def test_coupled_friction_is_tried_with_ratios_of_common_gears(signals):
+    """Whether the two joints turn the shaft forwards or back depends on the ratio."""
+    grid = get_effect("coupled_friction").grid(signals, (0, 1))
+    plain = {shape["ratio"] for shape in grid if len(shape) == 1}
+    assert plain == {1.0, -1.0, 0.5, -0.5, 2.0, -2.0}
+    assert all(shape["ratio"] > 0 for shape in grid if "differential" in shape)
+
+
 def test_a_cable_between_two_joints_only_pulls(signals):
     effect, x = get_effect("coupling_spring"), signals.q[:, 0] + 0.5 * signals.q[:, 1] - 0.1
     for side in (1.0, -1.0):

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from skidyn.effects import dahl_state
+from skidyn.effects import Term, dahl_state
 
 
 def test_friction(signals, columns_of):
@@ -49,3 +49,18 @@ def test_friction_of_one_direction_alone(signals, columns_of):
     for side in (1.0, -1.0):
         columns = columns_of("asymmetric_friction", signals, power=2.0, side=side)
         np.testing.assert_allclose(columns[:, 0], np.where(side * dq > 0, dq**2, 0.0))
+
+
+def test_friction_may_grow_up_to_a_speed(signals, columns_of):
+    dq = signals.dq[:, 0]
+    grown = 0.3 * (1 - np.exp(-np.abs(dq) / 0.3))
+    columns = columns_of("nonlinear_viscous", signals, power=2.0, saturating=0.3)
+    np.testing.assert_allclose(columns[:, 0], grown**2 * signals.sign[:, 0])
+    columns = columns_of("asymmetric_friction", signals, saturating=0.3, side=-1.0)
+    np.testing.assert_allclose(columns[:, 0], np.where(dq < 0, grown, 0.0))
+
+
+def test_friction_that_saturates_does_not_fall_with_the_speed():
+    """That would be Stribeck friction."""
+    term = Term("nonlinear_viscous", (1,), {"power": 1.0, "saturating": 0.2})
+    assert term.lowest[0] == 0 > Term("nonlinear_viscous", (1,), {"power": 2.0}).lowest[0]
