@@ -38,8 +38,8 @@ LEAST, SURE, BESIDE, FINALISTS = 15.0, 40.0, 0.3, 4
 CONFIRMED = 2 * DECISIVE
 #: Difference of gains up to which two axes are the same.
 TIED = 0.1
-#: Largest constant torque that the stated bodies leave about another axis, relative to the present
-#: one and to the residual: a weight that the stated axis explains would be chance.
+#: Largest constant torque that the stated bodies leave about another axis, relative to that about the
+#: stated one and to its residual: a weight that the latter explains would be chance.
 CONSTANT = 2.0
 
 
@@ -159,7 +159,6 @@ def find_axes(fits: Fits) -> list[Axis]:
         return []  # bodies of mimic joints have no separate columns
     few = fits.with_loads(False).few
     rough = few.nominal(Reading(), 1)
-    most = CONSTANT * max(fits.offset(Reading()), 1.0)
     every = np.vstack([np.eye(3), -np.eye(3)])
     tried: list[tuple[float, int, int, Array]] = []
     for body, axis in enumerate(tree.axes):
@@ -167,6 +166,7 @@ def find_axes(fits: Fits) -> list[Axis]:
             read = few.of(turned(robot, body, direction)).nominal(Reading(), 1)
             tried.append((float(read.margin(rough).sum()), len(tried), body, direction))
     here, before = fits.nominal(Reading()), fits.identified(Reading())
+    most = CONSTANT * np.maximum(np.abs(fits.offsets(Reading())), here.scale)
     found = []
     for rough_gain, _, body, direction in sorted(tried, reverse=True)[:FINALISTS]:
         if rough_gain < 0:
@@ -174,10 +174,10 @@ def find_axes(fits: Fits) -> list[Axis]:
         other = fits.of(turned(robot, body, direction))
         after = other.identified(Reading())
         confirmed, own = _gained(before, after)
-        if confirmed < DECISIVE or other.offset(Reading()) > most:
+        joint = int(tree.coordinates[body])
+        if confirmed < DECISIVE or abs(other.offsets(Reading())[joint]) > most[joint]:
             continue
         gain, drop = _gained(here, other.nominal(Reading()))
-        joint = int(tree.coordinates[body])
         stated = gain >= SURE and drop >= HALF
         decided = gain >= WEAKEST and confirmed >= CONFIRMED and own >= HALF
         if stated or (decided and after.margin(before)[joint] >= 0):

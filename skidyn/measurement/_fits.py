@@ -291,19 +291,29 @@ class Fits:
                 values[use[i]] -= basis @ (basis.T @ values[use[i]])
         return own, y
 
-    def offset(self, reading: Reading) -> float:
-        """Largest median difference from the stated bodies, in units of the scale of the residual.
+    def offsets(self, reading: Reading) -> Array:
+        """Median difference of every joint from the stated bodies, (n_joints,), N m or N.
 
-        Of a slider, the fit does not separate the mass from the inertia of its rotor.
+        It is 0 of a joint that is not fitted. Of a slider, the fit does not separate the mass from
+        the inertia of its rotor.
         """
         there, own = self.nominal(reading), self.columns(reading.of_motion)[:, 0]
-        offsets = [0.0]
+        found = np.zeros(self.n_joints)
         for j in range(self.n_joints):
             column, sign = reading.torque_column(j)
             if column in there.fits:
                 left = (sign * self._mean_torque[:, column] - own[:, j])[self.moving[:, column]]
-                offsets.append(abs(float(np.median(left))) / there.fits[column].scale)
-        return max(offsets)
+                found[j] = np.median(left)
+        return found
+
+    def offset(self, reading: Reading) -> float:
+        """Largest of these differences, in units of the scale of the residual."""
+        there, found = self.nominal(reading), np.abs(self.offsets(reading))
+        columns = [reading.torque_column(j)[0] for j in range(self.n_joints)]
+        scaled = [
+            x / there.fits[c].scale for x, c in zip(found, columns, strict=True) if c in there.fits
+        ]
+        return float(max(scaled, default=0.0))
 
     def coefficients(self, joint: int) -> Array:
         """Of a joint read as it is: multiple of its own torque, viscous, dry, rotor inertia."""

@@ -6,6 +6,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from scipy.signal import savgol_filter
 
 from skidyn.datasets import load_panda, load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
@@ -78,3 +79,26 @@ def test_of_two_equal_axes_the_usual_one_is_told_with_the_other(joint):
     (told,) = [s for s in check_log(log.frame, claimed).checks if s.certainty != "noted"]
     assert told.check == "axes" and told.joints == (joint,)
     assert '<axis xyz="0 0 1"/>' in told.evidence and "equally well" in told.evidence
+
+
+def test_an_axis_about_which_a_weight_would_be_chance_is_not_told():
+    """A motor on the carriage of another one couples two sliders, as an axis along both would."""
+
+    def slider(k, axis, mass):
+        return (
+            f'<link name="l{k}"><inertial><origin xyz="0.01 0.02 0.03"/><mass value="{mass}"/>'
+            '<inertia ixx="0.1" iyy="0.1" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="joint{k}" type="prismatic"><parent link="l{k - 1}"/><child link="l{k}"/>'
+            f'<axis xyz="{axis}"/><limit lower="-1" upper="1" effort="1000" velocity="3"/></joint>'
+        )
+
+    sliders = slider(1, "1 0 0", 20), slider(2, "0 1 0", 13), slider(3, "0 0 -1", 8.5)
+    text = f'<robot name="gantry"><link name="l0"/>{"".join(sliders)}</robot>'
+    gantry = Robot.from_urdf(text)
+    log = make_hidden_effect_log(gantry, None, n_trajectories=8, duration=6.0, random_state=1)
+    frame = log.frame.copy()
+    for _, rows in frame.groupby("trajectory"):
+        q = rows[["q2", "q3"]].to_numpy()
+        acceleration = savgol_filter(q, 21, 3, deriv=2, delta=0.01, axis=0)
+        frame.loc[rows.index, ["tau3", "tau2"]] += 5.6 * acceleration
+    assert "axes" not in {s.check for s in check_log(frame, gantry).checks}
