@@ -20,7 +20,7 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._ranking import RankingSearch
-from skidyn.diagnosis._rule import TAKEN_BACK
+from skidyn.diagnosis._rule import ALL_LEFT, TAKEN_BACK
 from skidyn.effects import NamelessEffect, get_effect
 
 
@@ -309,7 +309,13 @@ class JudgingSearch(RankingSearch):
         # The error of an imperfect formula does not become noise by one known effect.
         known = hypothesis.kind != UNKNOWN and not within_recordings(hypothesis)
         most = self._mostly_small(joints, hypothesis.gain, own, 0.5 * self.left)
-        return not known or most or self._price(hypothesis.candidates) > settings.white
+        if not known or most:
+            return True
+        # Nor does it vanish on several joints by one force.
+        several = all(len(c.rows) > 1 for c in hypothesis.candidates)
+        if several and not self._mostly_small(joints, hypothesis.gain, own, ALL_LEFT * self.left):
+            return False
+        return self._price(hypothesis.candidates) > settings.white
 
     def without_pieces(self, hypothesis: Hypothesis) -> tuple[Hypothesis, bool]:
         """The hypothesis without terms that are only parts of a force found before.

@@ -67,6 +67,9 @@ MASKED, SURE, ROUNDS = 0.3, 1e-9, 3
 #: Share of the torque of a coupling on one of its joints that must not be taken back there: what
 #: acts on a single joint takes back all of it.
 TAKEN_BACK = 0.5
+#: Share of what is left on several joints that an effect must remove not to be an error of earlier,
+#: imperfect formulas, though the rest is not white (``_acceptance.py``).
+ALL_LEFT = 0.9
 #: Share of a recording within which a change at its beginning or end lies between two recordings.
 BETWEEN = 0.02
 #: Share of an effect in one fold above which the others do not determine it: then parts of

@@ -126,13 +126,19 @@ class CoupledFriction(_PairEffect):
 
 
 class CoupledInertia(_PairEffect):
-    """Inertia of a shaft that turns with the sum of two joint velocities."""
+    """Inertia of a shaft that turns with the sum of two joint velocities.
+
+    If the model has the inertias of both joints already, only the torques ``across`` are missing:
+    of each joint through the acceleration of the other, as by a motor that another link carries. Of
+    the ratio only the sign matters then.
+    """
 
     kind = "coupled_inertia"
     drawn_against = "ddq"
     title = "Coupled inertia"
     formula = r"I_a\,(\ddot q_i + r\,\ddot q_j)"
     coefficients = (Coefficient("Ia", "kg m^2", sign=1),)
+    forms = ({"across": 1.0},)
     simplicity = 18
     rivals = ("rotor_inertia",)
     separating_motion = "the two joints accelerated together, then against each other"
@@ -142,6 +148,15 @@ class CoupledInertia(_PairEffect):
         self, signals: Signals, i: int, j: int, ratio: float, **form: float
     ) -> Array:
         return (signals.ddq[:, i] + ratio * signals.ddq[:, j])[:, None]
+
+    def torque_columns(
+        self, signals: Signals, joints: Sequence[int], **shape: Any
+    ) -> dict[int, Array]:
+        if "across" not in shape:
+            return super().torque_columns(signals, joints, **shape)
+        i, j = joints
+        ratio = np.copysign(self.travel(signals, joints, shape), shape["ratio"])
+        return {own: ratio * signals.ddq[:, [other]] for own, other in ((i, j), (j, i))}
 
 
 class CouplingSpring(_PairEffect):

@@ -70,3 +70,19 @@ def test_what_depends_on_another_joint_without_a_reaction_is_no_coupling():
 
     assert not [f for f in diagnosis.findings if f.kind == "coupled_inertia"]
     assert diagnosis.verdict == "unknown"
+
+
+@pytest.mark.slow
+def test_a_floor_that_explains_all_that_a_larger_force_leaves_is_no_error_of_the_force(found_in):
+    """Nor is the force withdrawn because it increases the error until the floor is found."""
+    robot = load_ur5()
+    log = make_hidden_effect_log(robot, "environment_contact", n_trajectories=8, duration=6.0)
+    q = log.X[[f"q{j + 1}" for j in range(robot.n_joints)]].to_numpy()
+    pulled = np.isin(log.X["trajectory"], (1, 4, 6))
+    torque = np.array(log.y)
+    force = np.array([28.0, 38.0, 14.0, 0.0, 0.0, 0.0])
+    torque[pulled] += np.einsum("nij,i->nj", robot.jacobian(q[pulled]), force)
+
+    found = set(found_in(robot, log.X, torque))
+
+    assert found == {"external_wrench", "environment_contact"}

@@ -84,6 +84,12 @@ def test_the_shafts_of_a_differential_may_have_unequal_friction(signals):
     assert names == ["Fc", "Fv", "Fc2", "Fv2"]
 
 
+def test_an_inertia_may_act_across_two_joints_only(signals):
+    columns = get_effect("coupled_inertia").torque_columns(signals, (0, 1), ratio=-1.0, across=1.0)
+    np.testing.assert_array_equal(columns[0][:, 0], -signals.ddq[:, 1])
+    np.testing.assert_array_equal(columns[1][:, 0], -signals.ddq[:, 0])
+
+
 def test_coupled_friction_is_tried_with_ratios_of_common_gears(signals):
     """Whether the two joints turn the shaft forwards or back depends on the ratio."""
     grid = get_effect("coupled_friction").grid(signals, (0, 1))
