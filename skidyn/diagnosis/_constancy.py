@@ -9,8 +9,8 @@ time. An effect that differs significantly, by more than a small share of what i
 sure.
 
 The torque of an effect with another formula than the given one is not removed entirely, and what is
-left may look like a second, smaller effect. Such a second effect is less sure if the first one, times
-functions of time and motion, would explain most of it.
+left may look like a second, smaller effect. Such a second effect is less sure if the first one,
+times functions of time and motion, would explain most of it.
 
 References
 ----------

@@ -2,8 +2,9 @@
 """Withdrawal of findings: everything that was found is judged again beside all others.
 
 A finding is withdrawn if it does not reduce the error of samples (:func:`useless`), if its size may
-be zero or cannot be (:func:`to_withdraw`), or if it is more likely wrong than right (:func:`guess`). One that is too
-small to matter stays in the completed model without being listed (:func:`slight`).
+be zero or cannot be (:func:`to_withdraw`), or if it is more likely wrong than right
+(:func:`guess`). One that is too small to matter stays in the completed model without being listed
+(:func:`slight`).
 """
 
 from __future__ import annotations

@@ -117,8 +117,8 @@ class AsymmetricFriction(Effect):
 
     It grows with the speed, or with another ``power`` of it (1 if the shape has none); speeds are
     in units of 1 rad/s or 1 m/s, so that the unit of the coefficient is the same. Or it grows up to
-    a speed, ``saturating``, as ``v (1 - exp(-|dq| / v))``. With a ``side`` (1 or -1) it acts only in
-    one direction of motion.
+    a speed, ``saturating``, as ``v (1 - exp(-|dq| / v))``. With a ``side`` (1 or -1) it acts only
+    in one direction of motion.
     """
 
     kind = "asymmetric_friction"

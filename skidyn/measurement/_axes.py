@@ -38,8 +38,8 @@ LEAST, SURE, BESIDE, FINALISTS = 15.0, 40.0, 0.3, 4
 CONFIRMED = 2 * DECISIVE
 #: Difference of gains up to which two axes are the same.
 TIED = 0.1
-#: Largest constant torque that the stated bodies leave about another axis, relative to that about the
-#: stated one and to its residual: a weight that the latter explains would be chance.
+#: Largest constant torque that the stated bodies leave about another axis, relative to that about
+#: the stated one and to its residual: a weight that the latter explains would be chance.
 CONSTANT = 2.0
 
 
