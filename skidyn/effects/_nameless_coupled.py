@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Unknown torques caused by a load, by another joint, or by an oscillating mass on the link."""
+"""Unknown torques caused by another joint, or by an oscillating mass on the link."""
 
 from __future__ import annotations
 
@@ -38,33 +38,6 @@ class FrictionOverOtherLoad(NamelessEffect):
         load = np.abs(signals.load[:, int(shape["other"])]) / max(shape["size"], 1e-300)
         sign = signals.sign[:, joint]
         return np.column_stack([load * sign, load**2 * sign])
-
-
-class BentTorque(NamelessEffect):
-    """A torque that is not linear in that of the model: a motor or a sensor at high load."""
-
-    kind = "bent_torque"
-    drawn_against = "load"
-    title = "Nonlinear function of the joint's own torque"
-    formula = r"c_1\,\tau\,|\tau| + c_2\,\tau^2 + c_3\,\tau^3"
-    coefficients = unnamed_coefficients(3)
-    needs = ("model_torque",)
-    is_of_one_number = True
-
-    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
-        return (f"tau{joint + 1}",)
-
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        if signals.model_torque is None:
-            return []
-        size = float(np.sqrt(np.mean(signals.model_torque[:, joints[0]] ** 2)))
-        return [{"size": size}] if size else []
-
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        assert signals.model_torque is not None
-        torque = signals.model_torque[:, joint]
-        share = torque / shape["size"]
-        return np.column_stack([torque * np.abs(share), torque * share, torque * share**2])
 
 
 class Crosstalk(NamelessEffect):
@@ -160,7 +133,6 @@ class SwingingLoad(NamelessEffect):
 
 COUPLED: tuple[type[NamelessEffect], ...] = (
     FrictionOverOtherLoad,
-    BentTorque,
     Crosstalk,
     GyroscopicCouple,
     SwingingLoad,

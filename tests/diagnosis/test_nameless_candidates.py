@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm
-from skidyn.diagnosis import diagnose
-from skidyn.identification import RBDRegressor
 
 
 @pytest.mark.slow
@@ -17,14 +15,3 @@ def test_what_passes_on_another_share_of_torque_than_of_way_is_no_spring(arm_log
     torque += pull[:, None] * [1.0, -0.5]
 
     assert found_in(load_planar_arm(), arm_log.X, torque) == {"unknown": {1, 2}}
-
-
-@pytest.mark.slow
-def test_a_sensor_that_reads_too_much_at_high_load_is_a_function_of_its_torque(arm_log):
-    torque = np.array(arm_log.y)
-    torque[:, 1] *= 1 + 0.3 * (torque[:, 1] / np.abs(torque[:, 1]).max()) ** 2
-
-    diagnosis = diagnose(RBDRegressor(load_planar_arm()), arm_log.X, torque)
-
-    (finding,) = diagnosis.findings
-    assert (finding.kind, finding.joints, finding.variables) == ("unknown", (2,), ("tau2",))

@@ -23,16 +23,6 @@ def test_crosstalk_is_the_torque_of_the_other_joint(signals):
     )
 
 
-def test_a_torque_that_is_not_linear_is_a_function_of_itself(signals):
-    effect = get_effect("bent_torque")
-    (shape,) = effect.grid(signals, (1,))
-    assert effect.variables(1, shape) == ("tau2",)
-    torque = signals.model_torque[:, 1]
-    columns = effect.columns(signals, 1, **shape)
-    np.testing.assert_allclose(columns[:, 2], torque**3 / shape["size"] ** 2)
-    np.testing.assert_allclose(columns[:, 0] * np.sign(torque), columns[:, 1])
-
-
 def test_friction_over_the_load_of_another_joint_names_both(signals):
     effect = get_effect("friction_over_other_load")
     (shape,) = effect.grid(signals, (0,))
