@@ -156,6 +156,8 @@ class ReconsideringSearch(JudgingSearch):
         ranking = self.rank()
         best = self.accepted(ranking)
         self._reconsidering = False
+        if best is not None and any(map(uses_the_fit, best.candidates)):
+            best = replace(best, score=self._score_without(best))
         again = self._finals([list(old.candidates)])
         known = best is not None and best.kind != UNKNOWN
         if best is not None and best.kind == old.kind == UNKNOWN:
@@ -170,6 +172,17 @@ class ReconsideringSearch(JudgingSearch):
         self.refit()
         self.sigma, self.left = self.weights(), self._left()
         return best
+
+    def _score_without(self, best: Hypothesis) -> float:
+        """Score of an explanation by the torque of a model that lacks what it replaces.
+
+        The columns with which it was ranked are those of a model that has it: a gain of a torque
+        that contains an end stop explains the stop.
+        """
+        self.problem.set_fit(self.fit)
+        for candidate in filter(uses_the_fit, best.candidates):
+            candidate.rows.update(self.problem.term_rows(candidate.term))
+        return max((h.score for h in self._finals([list(best.candidates)])), default=-np.inf)
 
     def _name_in_place(
         self, old: Hypothesis, ranking: Sequence[Hypothesis], with_old: Array
