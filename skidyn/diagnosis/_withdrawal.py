@@ -28,7 +28,13 @@ from skidyn.diagnosis._hypothesis import (
     on_samples,
 )
 from skidyn.diagnosis._result import Diagnosis
-from skidyn.diagnosis._rule import CHANGE_SHARE, GUESS, LITTLE, SURE_OF_LITTLE
+from skidyn.diagnosis._rule import (
+    CHANGE_SHARE,
+    GUESS,
+    LITTLE,
+    SURE_OF_LITTLE,
+    UNLIKELY,
+)
 from skidyn.diagnosis._search_state import replace_torque
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
@@ -181,8 +187,8 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
     """The last finding with terms that are more likely wrong than right, and these terms.
 
     If an explanation on other joints is equally good, one of the two is right, and both are
-    reported. A finding that removes most of an error is kept as its best explanation, as is (in
-    :func:`conclude`) one that removes much of it where all else is noise; one that removes very
+    reported. A finding that removes most of an error is kept as its best explanation unless it is
+    unlikely, as is (in :func:`conclude`) one that removes much of it where all else is noise; one that removes very
     little needs a high confidence. An effect whose times were chosen has to be constant within
     them: otherwise they only show where the error of another effect is large. One that another
     formula of another finding would explain has to be likely by itself.
@@ -199,7 +205,7 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
         little = LITTLE * _share_of_samples(diagnosis.problem, finding.trajectories)
         if drop < little and likely < SURE_OF_LITTLE:
             return False
-        return max(likely, finding.error_drop) >= GUESS
+        return likely >= GUESS or (finding.error_drop >= GUESS and likely >= UNLIKELY)
 
     sure = {term: is_sure(f) for f in diagnosis.findings for term in f.terms}
     for hypothesis in reversed(diagnosis.result.findings):
