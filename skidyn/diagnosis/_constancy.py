@@ -89,7 +89,8 @@ def changes(problem: Problem, result: SearchResult) -> dict[str, Change]:
             size = result.fit.coefficients[own[term]]
             of_kind[term] = {j: block @ size for j, block in blocks[term].items()}
     tests: dict[str, list[tuple[float, float]]] = {}
-    without, drops = {}, {}
+    without: dict[str, Tester] = {}
+    drops: dict[Term, float] = {}
     for kind, of_kind in torques.items():
         rest = [rows for term, rows in blocks.items() if term not in of_kind]
         without[kind] = Tester(bare, rest, sigma, target)

@@ -188,10 +188,10 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
 
     If an explanation on other joints is equally good, one of the two is right, and both are
     reported. A finding that removes most of an error is kept as its best explanation unless it is
-    unlikely, as is (in :func:`conclude`) one that removes much of it where all else is noise; one that removes very
-    little needs a high confidence. An effect whose times were chosen has to be constant within
-    them: otherwise they only show where the error of another effect is large. One that another
-    formula of another finding would explain has to be likely by itself.
+    unlikely, as is (in :func:`conclude`) one that removes much of it where all else is noise; one
+    that removes very little needs a high confidence. An effect whose times were chosen has to be
+    constant within them: otherwise they only show where the error of another effect is large. One
+    that another formula of another finding would explain has to be likely by itself.
     """
 
     def is_sure(finding: Finding) -> bool:
