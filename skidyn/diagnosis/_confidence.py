@@ -91,7 +91,7 @@ def confidence(
     removed : float
         Largest share of the squared error of a joint that the effect removes.
     q_value : float, default=0.0
-        Smallest q-value of the effect on a joint.
+        Smallest q-value of a known effect on a joint.
     lead : float, default=inf
         Margin over the best other explanation as twice a log-likelihood.
     nameless : bool, default=False
@@ -127,7 +127,7 @@ def confidence(
     logit = CONSTANT + (0.0 if stays else MARGIN * min(max(margin, 0.0), 1.0))
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
     logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
-    logit += WEAK * float(np.log10(max(q_value / STRONG, 1.0)))
+    logit += WEAK * has_name * float(np.log10(max(q_value / STRONG, 1.0)))
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
     logit += STAYS * stays + FEW * few + ALIKE * alike + INSTEAD * instead
     equal = EQUAL_IN_SOME if in_some else EQUAL

@@ -80,7 +80,7 @@ CONFINED = 0.8
 #: unless another effect is equally good (``_withdrawal.py``; ``confidence.py``).
 GUESS = 0.5
 #: Below this confidence, it is not a finding whatever it removes.
-UNLIKELY = 0.1
+UNLIKELY = 0.02
 #: The only finding, if it removes a larger share and only noise is left, is reported as the most
 #: likely effect even with a lower confidence.
 MUCH = 0.1

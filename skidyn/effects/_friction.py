@@ -67,6 +67,8 @@ class Coulomb(Effect):
 
 #: Range of the speed at which friction saturates, in units of the joint.
 SATURATING = (0.02, 3.0)
+#: Distance from one of a power of the speed that is called viscous friction.
+NEARLY_VISCOUS = 0.1
 
 
 def saturated(speed: Array, at: float | None) -> Array:
@@ -181,6 +183,10 @@ class NonlinearViscous(Effect):
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         tried = super().grid(signals, joints)
         return [s for s in tried if "saturating" not in s or s["power"] < 1.0]
+
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        viscous = "saturating" not in shape and abs(shape["power"] - 1.0) < NEARLY_VISCOUS
+        return not viscous and super().admissible(signals, joints, shape)
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         speed = saturated(np.abs(signals.dq[:, joint]), shape.get("saturating"))
