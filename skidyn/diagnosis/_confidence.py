@@ -139,6 +139,27 @@ def confidence(
     return min(MOST_IN_DOUBT if doubtful else MOST, float(1 / (1 + np.exp(-logit))))
 
 
+def of_significant(probability: float, q_value: float) -> float:
+    """Confidence of a name without what its weak significance takes off.
+
+    Whether something is there has been tested already.
+
+    Parameters
+    ----------
+    probability : float
+        Confidence (:func:`confidence`).
+    q_value : float
+        The q-value with which it was computed.
+
+    Returns
+    -------
+    float
+    """
+    odds = probability / max(1 - probability, 1e-9)
+    odds *= float(np.exp(-WEAK * np.log10(max(q_value / STRONG, 1.0))))
+    return odds / (1 + odds)
+
+
 def in_doubt(probability: float) -> float:
     """Confidence of an effect if a check suspects the signals of its joints.
 

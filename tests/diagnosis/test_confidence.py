@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from skidyn.diagnosis import confidence
-from skidyn.diagnosis._confidence import mostly_stays
+from skidyn.diagnosis._confidence import mostly_stays, of_significant
 
 
 def test_a_clear_name_is_sure_but_never_certain():
@@ -67,3 +67,8 @@ def test_the_more_an_effect_changes_the_less_sure_is_its_name():
     assert sure == sorted(sure, reverse=True)
     assert sure[0] > 0.8
     assert sure[-1] < 0.5
+
+
+def test_whether_something_is_there_is_not_asked_again():
+    weak = confidence(0.3, 1.0, 0.05, q_value=1e-5)
+    assert of_significant(weak, 1e-5) == pytest.approx(confidence(0.3, 1.0, 0.05))
