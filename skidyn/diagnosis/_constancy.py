@@ -89,22 +89,34 @@ def changes(problem: Problem, result: SearchResult) -> dict[str, Change]:
             size = result.fit.coefficients[own[term]]
             of_kind[term] = {j: block @ size for j, block in blocks[term].items()}
     tests: dict[str, list[tuple[float, float]]] = {}
-    without: dict[str, Tester] = {}
-    drops: dict[Term, float] = {}
+    explained, instead = {}, {}
+
+    def beside(*kinds: str) -> Tester:
+        """Tests given the model without some kinds."""
+        gone = {term for kind in kinds for term in torques[kind]}
+        rest = [rows for term, rows in blocks.items() if term not in gone]
+        return Tester(bare, rest, sigma, target)
+
     for kind, of_kind in torques.items():
-        rest = [rows for term, rows in blocks.items() if term not in of_kind]
-        without[kind] = Tester(bare, rest, sigma, target)
-        drops |= {term: without[kind].test(blocks[term]).drop for term in of_kind}
+        without = beside(kind)
+        explained[kind] = sum(without.test(blocks[term]).drop for term in of_kind)
+        other = _instead(bare, torques, kind, without, explained[kind])
+        if other is not None:
+            # a formula does not leave more than it removes
+            joints = {j for torque in of_kind.values() for j in torque}
+            there = [t for t, torque in torques[other].items() if joints & set(torque)]
+            removed = sum(beside(kind, other).test(blocks[term]).drop for term in there)
+            other = other if removed > explained[kind] else None
+        instead[kind] = other
         variants = [v for t, torque in of_kind.items() for v in _variants(bare, t, torque, blocks)]
         tests[kind] = [(test.chance, test.drop) for test in map(whole.test, variants)]
-    explained = {kind: sum(drops[t] for t in of_kind) for kind, of_kind in torques.items()}
     level = CHANGE_LEVEL / max(1, sum(map(len, tests.values())))
     least = np.finfo(float).tiny
     return {
         kind: Change(
             max((drop for chance, drop in found if chance < level), default=0.0)
             / max(explained[kind], least),
-            _instead(bare, torques, kind, without[kind], drops),
+            instead[kind],
         )
         for kind, found in tests.items()
     }
@@ -115,20 +127,16 @@ def _instead(
     torques: dict[str, dict[Term, _Block]],
     kind: str,
     without: Tester,
-    drops: dict[Term, float],
+    explained: float,
 ) -> str | None:
-    """Kind of another effect on the same joints whose change explains most of what a kind does.
-
-    A formula does not leave more than it removes.
-    """
+    """Kind of another effect on the same joints whose change explains most of what a kind does."""
     joints = {j for torque in torques[kind].values() for j in torque}
-    explained = sum(drops[term] for term in torques[kind])
     best, most = None, CHANGE_INSTEAD * explained
     for other, of_kind in torques.items():
-        there = {term: torque for term, torque in of_kind.items() if joints & set(torque)}
-        if other == kind or sum(drops[term] for term in there) < explained:
+        if other == kind:
             continue
-        for block in (b for torque in there.values() for b in _reshaped(problem, torque)):
+        there = [torque for torque in of_kind.values() if joints & set(torque)]
+        for block in (b for torque in there for b in _reshaped(problem, torque)):
             drop = without.test(block).drop
             if drop > most:
                 best, most = other, drop
