@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
-from skidyn.diagnosis._confidence import COLOURED, ENOUGH, LEAST
+from skidyn.diagnosis._confidence import COLOURED, ENOUGH, LEAST, STRONG
 
 BINS = (0.0, 0.6, 0.75, 0.85, 0.9, 0.95, 1.0)
 #: These act on the tool or the base: any joint is right.
@@ -63,11 +63,13 @@ def names(truth: Path, reports: Path) -> list[tuple[float, bool, list[float]]]:
             joints = {j for e in alike for j in e["joints"]}
             slow = inflation[[j - 1 for j in joints]].max()
             drop = max(e["error_drop"] for e in alike)
+            chance = min(e["q_value"] or 0.0 for e in alike)
             tells = [
                 min(max(effect["margin"], 0.0), 1.0),
                 np.log(max(slow / COLOURED, 1.0)),
                 np.log10(min(max(drop, LEAST), ENOUGH) / ENOUGH),
                 float(bool(nameless & joints)),
+                np.log10(max(chance / STRONG, 1.0)),
             ]
             rows.append((effect["confidence"], right(effect, table[file.stem]), tells))
     return rows
@@ -101,7 +103,7 @@ def main() -> None:
         fit = LogisticRegression(C=3.0).fit(np.array([t for _, _, t in rows]), good)
         weights = ", ".join(f"{w:.2f}" for w in (*fit.intercept_, *fit.coef_[0]))
         print(
-            "weights (constant, margin, correlated, removed, nameless beside it) of these: "
+            "weights (constant, margin, correlated, removed, nameless beside it, weak) of these: "
             f"{weights}"
         )
 

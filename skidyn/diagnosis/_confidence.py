@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Confidence of a finding: the probability that its effect is right, from generated logs.
 
-It depends on the margin over the best other explanation; on its significance; on the remainder on
-its joints, which is white for noise, and slow if a torque was attributed to a wrong effect; on the
-share of the error that it removes, and on whether most of it remains; and on unknown effects on the
-same joints. The
-weights are those of a logistic regression on effects identified in logs of other seeds
-(``benchmarks/diagnosis/confidence.py``), kept near round values; that of an error that mostly
-remains was set with five collections of logs (``docs/user_guide/diagnosis_measured.rst``). The same
-benchmark prints the reliability on other logs.
+It depends on the margin over the best other explanation; on the significance of the effect; on the
+remainder on its joints, which is white for noise, and slow if a torque was attributed to a wrong
+effect; on the share of the error that it removes, and on whether most of it remains; and on unknown
+effects on the same joints. The weights are those of a logistic regression on effects identified in
+logs of other seeds (``benchmarks/diagnosis/confidence.py``), kept near round values; those of the
+significance and of an error that mostly remains were set with five collections of logs
+(``docs/user_guide/diagnosis_measured.rst``). The same benchmark prints the reliability on other
+logs.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def confidence(
     logit = CONSTANT + (0.0 if stays else MARGIN * min(max(margin, 0.0), 1.0))
     logit += CORRELATED * float(np.log(max(inflation / COLOURED, 1.0)))
     logit += REMOVED * float(np.log10(min(max(removed, LEAST), ENOUGH) / ENOUGH))
-    logit += WEAK * has_name * float(np.log10(max(q_value / STRONG, 1.0)))
+    logit += _weak(q_value) * has_name
     logit += NAMELESS * nameless + BLOCKS * (not whole_recordings)
     logit += STAYS * stays + FEW * few + ALIKE * alike + INSTEAD * instead
     equal = EQUAL_IN_SOME if in_some else EQUAL
@@ -155,9 +155,7 @@ def of_significant(probability: float, q_value: float) -> float:
     -------
     float
     """
-    odds = probability / max(1 - probability, 1e-9)
-    odds *= float(np.exp(-WEAK * np.log10(max(q_value / STRONG, 1.0))))
-    return odds / (1 + odds)
+    return _moved(probability, -_weak(q_value))
 
 
 def in_doubt(probability: float) -> float:
@@ -173,8 +171,18 @@ def in_doubt(probability: float) -> float:
     float
         At most 0.88.
     """
-    odds = probability / max(1 - probability, 1e-9) * float(np.exp(DOUBTED))
-    return min(MOST_IN_DOUBT, odds / (1 + odds))
+    return min(MOST_IN_DOUBT, _moved(probability, DOUBTED))
+
+
+def _weak(q_value: float) -> float:
+    """Logit that a weak significance takes off a name, not positive."""
+    return WEAK * float(np.log10(max(q_value / STRONG, 1.0)))
+
+
+def _moved(probability: float, logit: float) -> float:
+    """A probability with something added to its logit."""
+    odds = probability / max(1 - probability, 1e-9) * float(np.exp(logit))
+    return odds / (1 + odds)
 
 
 def mostly_stays(before: Array, after: Array, noise: Array) -> bool:

@@ -179,9 +179,7 @@ class ReconsideringSearch(JudgingSearch):
         The columns with which it was ranked are those of a model that has it: a gain of a torque
         that contains an end stop explains the stop.
         """
-        self.problem.set_fit(self.fit)
-        for candidate in filter(uses_the_fit, best.candidates):
-            candidate.rows.update(self.problem.term_rows(candidate.term))
+        self.renew(best.candidates)
         return max((h.score for h in self._finals([list(best.candidates)])), default=-np.inf)
 
     def _name_in_place(

@@ -116,13 +116,17 @@ class SearchState:
         # absence.
         for _ in range(self.settings.repeated):
             before = self.fit.noise
-            self.problem.set_fit(self.fit)
-            for candidate in filter(uses_the_fit, self.chosen):
-                candidate.rows.update(self.problem.term_rows(candidate.term))
+            self.renew(self.chosen)
             problem = replace_torque(self.problem, self.problem.torque - self.ripple)
             self.fit = problem.fit(terms, sigma=before)
             if np.allclose(self.fit.noise, before, rtol=0.01):
                 break
+
+    def renew(self, candidates: Sequence[Candidate]) -> None:
+        """Compute the columns that depend on the fit with the present one."""
+        self.problem.set_fit(self.fit)
+        for candidate in filter(uses_the_fit, candidates):
+            candidate.rows.update(self.problem.term_rows(candidate.term))
 
     def weights(self) -> Array:
         """Noise by which joints are weighted in tests: that of the fit, or of each joint alone."""

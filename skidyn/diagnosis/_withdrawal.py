@@ -85,9 +85,10 @@ def useless(
 
     Notes
     -----
-    They reduced the error of averaged rows. The squared error, which few samples may dominate, and
-    the mean absolute one are both used; terms that do not lower the squared error at all are
-    included. Terms of some recordings need to remove less, by the share of samples of these.
+    Terms of findings have reduced the error of averaged rows. The squared error, which few samples
+    may dominate, and the mean absolute one are both used; terms that do not lower the squared error
+    at all are included. Terms of some recordings need to remove less, by the share of samples of
+    these.
 
     Where the noise of positions exceeds that of the torque, it dominates the error of samples, and
     changes with the inertia of the model: there the held-out error of averaged rows counts.

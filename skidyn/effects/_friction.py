@@ -65,25 +65,6 @@ class Coulomb(Effect):
         return signals.sign[:, [joint]]
 
 
-#: Range of the speed at which friction saturates, in units of the joint.
-SATURATING = (0.02, 3.0)
-#: Distance from one of a power of the speed that is called viscous friction.
-NEARLY_VISCOUS = 0.1
-
-
-def saturated(speed: Array, at: float | None) -> Array:
-    """A speed that grows up to a limit only, in the same unit; as it is without a limit.
-
-    Parameters
-    ----------
-    speed : ndarray of shape (n_samples,), rad/s or m/s
-        Not negative.
-    at : float or None, rad/s or m/s
-        Its limit.
-    """
-    return speed if at is None else at * -np.expm1(-speed / at)
-
-
 class Stribeck(Effect):
     """Extra dry friction at low speed that fades as the lubricant film builds up.
 
@@ -112,6 +93,25 @@ class Stribeck(Effect):
         fading = 1 / (1 + grown) if "lorentzian" in shape else np.exp(-grown)
         friction: Array = fading * signals.sign[:, joint]
         return friction[:, None]
+
+
+#: Range of the speed at which friction saturates, in units of the joint.
+SATURATING = (0.02, 3.0)
+#: Distance from one of a power of the speed that is called viscous friction.
+NEARLY_VISCOUS = 0.1
+
+
+def saturated(speed: Array, at: float | None) -> Array:
+    """A speed that grows up to a limit only, in the same unit; as it is without a limit.
+
+    Parameters
+    ----------
+    speed : ndarray of shape (n_samples,), rad/s or m/s
+        Not negative.
+    at : float or None, rad/s or m/s
+        Its limit.
+    """
+    return speed if at is None else at * -np.expm1(-speed / at)
 
 
 class AsymmetricFriction(Effect):

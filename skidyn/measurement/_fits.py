@@ -307,7 +307,7 @@ class Fits:
         return found
 
     def offset(self, reading: Reading) -> float:
-        """Largest of these differences, in units of the scale of the residual."""
+        """Largest of the :meth:`offsets` without sign, in units of the scale of the residual."""
         there, found = self.nominal(reading), np.abs(self.offsets(reading))
         columns = [reading.torque_column(j)[0] for j in range(self.n_joints)]
         scaled = [
