@@ -27,7 +27,7 @@ from skidyn.diagnosis._hypothesis import (
 )
 from skidyn.diagnosis._parts import part_candidates
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
-from skidyn.diagnosis._recordings import choose, own_friction
+from skidyn.diagnosis._recordings import DRIFT, FRICTION, choose, drifting, own_friction
 from skidyn.diagnosis._rule import (
     MASKED,
     RESOLVED,
@@ -36,7 +36,7 @@ from skidyn.diagnosis._rule import (
 )
 from skidyn.diagnosis._screen import Model, Screen
 from skidyn.diagnosis._search_state import SearchState
-from skidyn.diagnosis._spans import span_candidates
+from skidyn.diagnosis._spans import FOLLOWS_ANY, span_candidates
 from skidyn.diagnosis._spectrum import Line, find_lines, find_vibrations
 from skidyn.diagnosis._split import recordings_with, split_effects
 from skidyn.effects import get_effect
@@ -300,7 +300,18 @@ class RankingSearch(SearchState):
         already = {c.kind for c in self.chosen if c.term.spans}
         kinds = [kind for kind in self.kinds if kind not in already]
         found = span_candidates(self.problem, kinds, tester, self.significant, least)
-        return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
+        found = [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
+        return [self._in_time(own) for own in found]
+
+    def _in_time(self, own: list[Candidate]) -> list[Candidate]:
+        """An offset or friction in intervals of many recordings as an unknown function of time.
+
+        With intervals of its own in every recording it would follow any missing torque.
+        """
+        timed = {name for c in own for name, *_ in c.term.spans}
+        if own[0].kind not in FOLLOWS_ANY or len(timed) <= self.settings.most_recordings:
+            return own
+        return [replace(c, kind=UNKNOWN, variables=("time",)) for c in own]
 
     def _courses(self) -> list[list[Candidate]]:
         """Effects that change steadily, those that may be possible."""
@@ -488,6 +499,7 @@ class RankingSearch(SearchState):
             return self._same_or_own(chosen) if chosen else []
 
         known = {c.kind for c in self.chosen if some_recordings(c)}
+        known |= set(FRICTION) if DRIFT in known else set()
         kinds = dict.fromkeys(c.kind for c in self.by_recording)
         return [partial(look, kind) for kind in kinds if kind not in known]
 
@@ -502,10 +514,12 @@ class RankingSearch(SearchState):
         remainder of the joint is white.
         """
         most, white = self.settings.most_recordings, self.settings.white
-        few, many = [], []
+        few, drift, many = [], [], []
         for part in grouped_by_joints(chosen):
             named = len(part) <= most or self._price(part) <= white
-            few += part if named else []
+            changes = drifting(self.problem, self.kinds, part) if named else []
+            drift += changes
+            few += part if named and not changes else []
             many += [] if named else part
         many = [replace(c, kind=UNKNOWN, variables=("trajectory",)) for c in many]
-        return [part for part in (few, many) if part]
+        return [part for part in (few, drift, many) if part]

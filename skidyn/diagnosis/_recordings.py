@@ -120,17 +120,50 @@ def own_friction(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
         Kinds to try.
     """
     tried = set(kinds)
-    own = {(t.kind, t.places): t for t in problem.terms if t.kind in FRICTION}
-    terms = [t for t in own.values() if t.kind in tried and not t.is_open]
-    if DRIFT in tried:
-        effect = get_effect(DRIFT)
-        terms += [
-            Term.at(DRIFT, (j,), {"level": 1.0})
-            for j in range(problem.n_joints)
-            if all((kind, (j,)) in own for kind in FRICTION)
-            and effect.not_shown(problem.few, j) is None
-        ]
+    terms = [t for t in problem.terms if t.kind in FRICTION and t.kind in tried and not t.is_open]
+    terms += _other_levels(problem, tried, range(problem.n_joints))
     return [Candidate(term.kind, term, problem.term_rows(term)) for term in terms]
+
+
+def drifting(problem: Problem, kinds: Iterable[str], same: Sequence[Candidate]) -> list[Candidate]:
+    """Friction of a joint with several sizes in different recordings, as friction that drifts.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    kinds : iterable of str
+        Kinds to try.
+    same : sequence of Candidate
+        Terms of one kind on one joint, each of some recordings.
+
+    Returns
+    -------
+    list of Candidate
+        None if they are not friction of the model, or have only one size.
+    """
+    if len(same) < 2 or same[0].kind not in FRICTION:
+        return []
+    found = []
+    for whole in _other_levels(problem, set(kinds), same[0].joints):
+        rows = problem.term_rows(whole)
+        for group in (c.term.trajectories or () for c in same):
+            term = whole.with_shape(trajectories=group)
+            found.append(Candidate(DRIFT, term, rows_within(problem, rows, group)))
+    return found
+
+
+def _other_levels(problem: Problem, kinds: set[str], joints: Iterable[int]) -> list[Term]:
+    """Other levels of the whole friction of joints that is in the model."""
+    own = {(t.kind, t.places) for t in problem.terms if t.kind in FRICTION}
+    if DRIFT not in kinds:
+        return []
+    return [
+        Term.at(DRIFT, (j,), {"level": 1.0})
+        for j in joints
+        if all((kind, (j,)) in own for kind in FRICTION)
+        and get_effect(DRIFT).not_shown(problem.few, j) is None
+    ]
 
 
 def choose(

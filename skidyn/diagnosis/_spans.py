@@ -26,6 +26,9 @@ from skidyn.evidence import Problem
 
 #: Interval of a recording: its number, first and last time in s.
 Span = tuple[int, float, float]
+#: Kinds that with intervals of their own in many recordings follow any torque: all five of these in
+#: logs of three examiners were another effect.
+FOLLOWS_ANY = ("offset", "viscous", "coulomb")
 
 
 def span_candidates(

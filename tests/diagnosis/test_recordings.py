@@ -55,6 +55,24 @@ def test_friction_of_the_model_may_have_another_level(log):
     assert kinds == [(kind, (j,)) for kind in ("coulomb", "friction_drift") for j in (0, 1)]
 
 
+def test_friction_of_several_levels_drifts(log):
+    torque, run = np.array(log.y), log.X["trajectory"].to_numpy()
+    level = np.select([run == 4, run == 5, run == 6], [0.3, 0.8, 0.5], 0.0)
+    torque[:, 1] += level * np.std(torque[:, 1]) * np.sign(log.X["dq2"])
+
+    assert found(log, torque) == {("friction_drift", (2,))}
+
+
+def test_an_offset_that_comes_and_goes_in_every_recording_is_no_offset(log):
+    torque, time = np.array(log.y), log.X["time"].to_numpy()
+    first = log.X.groupby("trajectory")["time"].transform("min").to_numpy()
+    begins = np.random.default_rng(3).uniform(0.3, 1.2, 11)[log.X["trajectory"]]
+    inside = (time - first > begins) & (time - first < begins + 3.0)
+    torque[:, 1] += 0.5 * np.std(torque[:, 1]) * inside
+
+    assert {kind for kind, _ in found(log, torque)} == {"unknown"}
+
+
 @pytest.mark.slow
 def test_an_offset_from_a_recording_on_is_one_of_the_later_recordings():
     log = make_hidden_effect_log(
