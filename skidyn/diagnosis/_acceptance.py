@@ -10,6 +10,7 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, rows_together
+from skidyn.diagnosis._confidence import SEPARATES
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
@@ -20,8 +21,9 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._ranking import RankingSearch
-from skidyn.diagnosis._rule import ALL_LEFT, TAKEN_BACK
+from skidyn.diagnosis._rule import ALL_LEFT, NEARER, TAKEN_BACK
 from skidyn.effects import NamelessEffect, get_effect
+from skidyn.evidence import weighted_least_squares
 
 
 class JudgingSearch(RankingSearch):
@@ -70,7 +72,46 @@ class JudgingSearch(RankingSearch):
                 simpler = simplicity_of(rival) < get_effect(part.kind).simplicity
                 if simpler and self._as_good(own, errors, part):
                     best = rival
-        return self._simplest_of_family(best, ranking)
+        return self._nearest_to_description(self._simplest_of_family(best, ranking), ranking)
+
+    def _nearest_to_description(
+        self, best: Hypothesis, ranking: Sequence[Hypothesis]
+    ) -> Hypothesis:
+        """Of explanations that the data cannot separate, one with bodies like those described.
+
+        The force of a counterweight and the inertia of a rotor on a vertical slide, for example,
+        differ by the mass that is identified only.
+        """
+        if not self.problem.rigid_body or best.kind == UNKNOWN or within_recordings(best):
+            return best
+        most = SEPARATES * self._price(best.candidates)
+        equal = [
+            h
+            for h in ranking
+            if h.kind not in (UNKNOWN, best.kind)
+            and h.joints == best.joints
+            and not within_recordings(h)
+            and h.n_parameters <= best.n_parameters
+            and h.is_further_form <= best.is_further_form
+            and abs(float((h.gain - best.gain).sum())) < most
+        ]
+        if not equal:
+            return best
+        distances = [self._from_description(h) for h in equal]
+        nearest = int(np.argmin(distances))
+        nearer = distances[nearest] < NEARER * self._from_description(best)
+        return equal[nearest] if nearer else best
+
+    def _from_description(self, hypothesis: Hypothesis) -> float:
+        """Torque on its joints by which bodies identified with it differ from those described.
+
+        The root of the sum of squares, in units of the noise.
+        """
+        problem, joints = self.problem, list(hypothesis.joints)
+        design = problem.design(self.blocks_with([*self.chosen, *hypothesis.candidates]))
+        found = weighted_least_squares(design, self.target, self.sigma)[: len(problem.rigid_index)]
+        changes = [problem.rigid_rows[j] @ found / self.sigma[j] for j in joints]
+        return float(np.linalg.norm(np.concatenate(changes)))
 
     def _on_joints_of(self, rival: Hypothesis, best: Hypothesis) -> Hypothesis:
         """The terms of a further form on the joints of a rival that has fewer of them.

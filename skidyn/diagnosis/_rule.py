@@ -70,6 +70,9 @@ TAKEN_BACK = 0.5
 #: Share of what is left on several joints that an effect must remove not to be an error of earlier,
 #: imperfect formulas, though the rest is not white (``_acceptance.py``).
 ALL_LEFT = 0.9
+#: Of explanations that the data cannot separate, one is preferred with which the torque of the
+#: identified bodies differs from that of the described ones by less than this share of the others.
+NEARER = 0.5
 #: Share of a recording within which a change at its beginning or end lies between two recordings.
 BETWEEN = 0.02
 #: Share of an effect in one fold above which the others do not determine it: then parts of

@@ -34,8 +34,8 @@ WIDTHS = 0.01 * 2.0 ** np.arange(6)
 WAYS = np.array([0.001 * 2.0**k for k in range(8)])
 #: Speeds, rad/s (a tenth in m/s), below which friction fades or grows, and by how many times.
 SPEEDS, TIMES = 0.02 * 2.0 ** np.arange(5), (1.0, 3.0, 10.0)
-#: Half of the time around a reversal, s, and degree of the polynomial for other torques: with a lower
-#: one, widely smoothed friction follows torque that grows with the speed.
+#: Half of the time around a reversal, s, and degree of the polynomial for other torques: with a
+#: lower one, widely smoothed friction follows torque that grows with the speed.
 AROUND, DEGREE = 0.4, 5
 #: Turns of a joint, at least and at most; samples around each at least.
 FEWEST, MOST, SAMPLES = 6, 60, 15
