@@ -306,7 +306,7 @@ class JudgingSearch(RankingSearch):
         return True
 
     def _judged_together(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """Terms that differ between recordings: significant together, and each alone at 5 %.
+        """Terms that differ between recordings: significant together, and each alone at 10 %.
 
         Each recording alone would have to be significant among all candidates, and one that is not
         would bias the test of the others. A part common to all recordings may be due to bodies, so
@@ -330,7 +330,7 @@ class JudgingSearch(RankingSearch):
     def _each_beside_the_others(
         self, rest: list[Candidate], others: Sequence[Candidate]
     ) -> list[Candidate]:
-        """Those of some recordings that are significant at 5 % in addition to the others."""
+        """Those of some recordings that are significant at 10 % in addition to the others."""
         while rest:
             chances = [self.chance(c, [*others, *(o for o in rest if o is not c)]) for c in rest]
             worst = int(np.argmax(chances))

@@ -14,9 +14,13 @@ error; such a candidate is also tested with the remaining noise.
 the score over blocks of time as independent, with any correlation and variance within a block (a
 sandwich estimate by blocks, unbiased if few of them contain most, Hotelling's law for their finite
 number [2]_). Blocks are several correlation times long and never cross the border of a trajectory;
-each holds the rows of all joints. The second treats the residual as stationary and inflates its
-variance by its autocorrelation. The first cannot judge an effect in a single block, the second does
-not account for noise that changes; a finding must be significant by both.
+each holds the rows of all joints. Its degrees of freedom are those of the blocks in which the
+candidate acts [3]_. An effect that acts in one or two blocks, such as a stop that one recording
+reaches, would never be significant with these: a tenth of the level is kept for the degrees of
+freedom of the independent rows in which it acts (Bonferroni). The second p-value treats the
+residual as stationary and inflates its variance by its autocorrelation. The first cannot judge an
+effect in a single block, the second does not account for noise that changes; a finding must be
+significant by both.
 
 **Level.** ``Settings.level`` over all candidates that were tried (Bonferroni): the printed q-value
 is the p-value times the number of candidates; for an effect in a part of the recordings also times
@@ -28,6 +32,8 @@ References
    autocorrelation consistent covariance matrix, Econometrica 55(3).
 .. [2] R. Ibragimov, U. K. Mueller (2010), t-statistic based correlation and heterogeneity robust
    inference, J. Business & Economic Statistics 28(4); C. B. Hansen (2007), J. Econometrics 141.
+.. [3] R. M. Bell, D. F. McCaffrey (2002), Bias reduction in standard errors for linear regression
+   with multi-stage samples, Survey Methodology 28(2).
 """
 
 from __future__ import annotations
@@ -52,6 +58,8 @@ MOST_LAGS, SMALL = 12, 0.05
 #: Number of blocks needed in addition to the tested coefficients; and least number of blocks, in
 #: addition to twice the coefficients, for a residual with a long correlation.
 FEWEST_BLOCKS, ENOUGH_BLOCKS = 6, 8
+#: Share of the level that is kept for effects in few blocks (``placebo.py``).
+IN_FEW_BLOCKS = 0.1
 #: Waves per turn from which an unknown function of position cannot represent torque ripple.
 RESOLVED = 40.0
 #: A column of which less than this share is new to the model is not tested.
@@ -277,7 +285,7 @@ class Settings:
     ripple_share: float = 0.8
     resolved: float = 2.0
     far_end: float = 0.95
-    member: float = 0.05
+    member: float = 0.1
     most_recordings: int = 2
     recordings_share: float = 0.8
     white: float = 2.0
@@ -636,7 +644,22 @@ class Tester:
         parts = [slice(*pair) for pair in pairwise(edges)]
         sums = np.array([columns[rows].T @ residual[rows] for rows in parts])
         grams = np.array([columns[rows].T @ columns[rows] for rows in parts])
-        return chance_of_score(*unbiased_scores(score, sums, grams), unbiased=True)
+        score, sums, share = unbiased_scores(score, sums, grams)
+        k, wald = len(score), _wald(score, sums)
+        if count < k + FEWEST_BLOCKS:
+            return 1.0
+        few = _hotelling(wald, k, min(count - 1.0, self._acting(new, left))) / IN_FEW_BLOCKS
+        many = _hotelling(wald, k, _degrees_of_freedom(share)) / (1.0 - IN_FEW_BLOCKS)
+        return min(1.0, few, many)
+
+
+    def _acting(self, new: list[Array], left: list[Array]) -> float:
+        """Number of independent rows in which some columns act."""
+        sizes = [np.linalg.norm(z, axis=1) for z in new]
+        j = int(np.argmax([float(x @ x) for x in sizes]))
+        power = np.concatenate(sizes) ** 2
+        inflation = variance_inflation(self.problem, [left[j]], [j], [sizes[j]])
+        return float(power.sum() ** 2 / (power @ power) / inflation[0])
 
 
 def _tail(statistic: float, k: float, free: float) -> float:
@@ -647,7 +670,7 @@ def _tail(statistic: float, k: float, free: float) -> float:
     return 1.0 if statistic <= 0 else float(fdtrc(k, free, statistic))
 
 
-def chance_of_score(score: Array, sums: Array, unbiased: bool = False) -> float:
+def chance_of_score(score: Array, sums: Array) -> float:
     """P-value of a score with independent sums over blocks (Hotelling's T-squared).
 
     Parameters
@@ -656,20 +679,44 @@ def chance_of_score(score: Array, sums: Array, unbiased: bool = False) -> float:
         Score of the model without the candidate, over all blocks.
     sums : ndarray of shape (n_blocks, n_coefficients)
         Score of every block, with the residual with the candidate.
-    unbiased : bool, default=False
-        Whether the sums are those of :func:`unbiased_scores`.
     """
     count, k = sums.shape
     if count < k + FEWEST_BLOCKS:
         return 1.0
     free = count - 1
-    spread = sums.T @ sums * (1.0 if unbiased else count / free)
-    spread += 1e-12 * np.trace(spread) * np.eye(k)
-    wald = float(score @ np.linalg.solve(spread, score))
-    return _tail(wald * (free - k + 1) / (k * free), k, free - k + 1)
+    return _hotelling(_wald(score, sums) * free / count, k, free)
 
 
-def unbiased_scores(score: Array, sums: Array, grams: Array) -> tuple[Array, Array]:
+def _wald(score: Array, sums: Array) -> float:
+    """Square of a score in units of the variance that its sums over blocks show."""
+    spread = sums.T @ sums
+    spread += 1e-12 * np.trace(spread) * np.eye(len(score))
+    return float(score @ np.linalg.solve(spread, score))
+
+
+def _hotelling(wald: float, k: int, free: float) -> float:
+    """P-value of a squared score of k coefficients with some degrees of freedom of its variance."""
+    rest = free - k + 1
+    return _tail(wald * rest / (k * free), k, rest) if rest > 0 else 1.0
+
+
+def _degrees_of_freedom(share: Array) -> float:
+    """Degrees of freedom of the variance from blocks with some shares of the information.
+
+    Twice the squared expectation over the variance of the sum of :func:`unbiased_scores`, for
+    independent rows.
+
+    Parameters
+    ----------
+    share : ndarray of shape (n_blocks, n_coefficients, n_coefficients)
+        Of every block, for orthonormal columns.
+    """
+    h = np.trace(share, axis1=1, axis2=2) / share.shape[1]
+    between = h**2 / np.maximum(1.0 - h, RIDGE)
+    return float(1.0 / (h @ h + between.sum() ** 2 - between @ between))
+
+
+def unbiased_scores(score: Array, sums: Array, grams: Array) -> tuple[Array, Array, Array]:
     """Scores of blocks whose sum of squares is the variance of the score also for few blocks.
 
     A block with much of the information about a coefficient draws it towards its own torque, and
@@ -690,6 +737,8 @@ def unbiased_scores(score: Array, sums: Array, grams: Array) -> tuple[Array, Arr
         For columns that are orthonormal.
     sums : ndarray of shape (n_blocks, n_coefficients)
         Of blocks for the same columns.
+    share : ndarray of shape (n_blocks, n_coefficients, n_coefficients)
+        Of every block of the information about the same coefficients.
 
     References
     ----------
@@ -702,7 +751,7 @@ def unbiased_scores(score: Array, sums: Array, grams: Array) -> tuple[Array, Arr
     share = root.T @ grams @ root
     value, vector = np.linalg.eigh(np.eye(k) - share)
     own = np.einsum("bji,bj->bi", vector, sums @ root) / np.sqrt(np.maximum(value, RIDGE))
-    return score @ root, np.einsum("bij,bj->bi", vector, own)
+    return score @ root, np.einsum("bij,bj->bi", vector, own), share
 
 
 def time_blocks(problem: Problem, length: float) -> tuple[list[NDArray[np.int64]], int]:
@@ -747,11 +796,15 @@ def block_length(problem: Problem, inflation: Iterable[float]) -> float:
 
 
 def variance_inflation(
-    problem: Problem, residual: Sequence[Array], joints: Sequence[int] | range
+    problem: Problem,
+    residual: Sequence[Array],
+    joints: Sequence[int] | range,
+    columns: Sequence[Array] | None = None,
 ) -> Array:
-    """Variance of a slow column's coefficient relative to that for independent rows, by joint.
+    """Variance of a column's coefficient relative to that for independent rows, by joint.
 
-    One plus twice the sum of the residual's autocorrelations up to the first small one.
+    One plus twice the sum of the residual's autocorrelations up to the first small one, each times
+    that of the column.
 
     Parameters
     ----------
@@ -761,6 +814,8 @@ def variance_inflation(
         Residual rows of some joints.
     joints : sequence of int
         These joints, from 0.
+    columns : sequence of ndarray of shape (n_rows_j,), optional
+        Column on the rows of each of them; by default, one that is slower than the residual.
 
     Returns
     -------
@@ -768,7 +823,8 @@ def variance_inflation(
     """
     inflation = np.ones(len(joints))
     for i, (j, r) in enumerate(zip(joints, residual, strict=True)):
-        x = r[problem.rows.in_time(j)]
+        order = problem.rows.in_time(j)
+        x, column = r[order], None if columns is None else columns[i][order]
         power = float(x @ x)
         if power <= 0:
             continue
@@ -777,6 +833,8 @@ def variance_inflation(
             rho = float(x[earlier] @ x[earlier + lag]) / power
             if rho < SMALL:
                 break
+            if column is not None:
+                rho *= float(column[earlier] @ column[earlier + lag] / (column @ column))
             inflation[i] += 2 * rho
     return inflation
 
