@@ -375,7 +375,7 @@ def _limits(
     counts = problem.rows.counts
     fit = result.fit
     inflation = variance_inflation(problem, fit.residual, range(problem.n_joints))
-    _, n_blocks = time_blocks(problem, block_length(problem, inflation))
+    _, n_blocks = time_blocks(problem, block_length(problem, float(inflation.max())))
     gain = sum((h.gain for h in result.findings), np.zeros(problem.n_joints))
     share = np.expm1(np.maximum(np.asarray(gain, dtype=float), 0.0) / np.maximum(counts, 1))
     earlier = np.asarray(counts * share, dtype=np.float64)

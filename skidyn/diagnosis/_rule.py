@@ -16,11 +16,11 @@ sandwich estimate by blocks, unbiased if few of them contain most, Hotelling's l
 number [2]_). Blocks are several correlation times long and never cross the border of a trajectory;
 each holds the rows of all joints. Its degrees of freedom are those of the blocks in which the
 candidate acts [3]_. An effect that acts in one or two blocks, such as a stop that one recording
-reaches, would never be significant with these: a tenth of the level is kept for the degrees of
-freedom of the independent rows in which it acts (Bonferroni). The second p-value treats the
-residual as stationary and inflates its variance by its autocorrelation. The first cannot judge an
-effect in a single block, the second does not account for noise that changes; a finding must be
-significant by both.
+reaches, would never be significant with these: a tenth of the level (Bonferroni) is kept for a
+variance that is moderated by that of the whole residual, as if the latter were known with a few
+degrees of freedom [4]_. The second p-value treats the residual as stationary and inflates its
+variance by its autocorrelation. The first cannot judge an effect in a single block, the second does
+not account for noise that changes; a finding must be significant by both.
 
 **Level.** ``Settings.level`` over all candidates that were tried (Bonferroni): the printed q-value
 is the p-value times the number of candidates; for an effect in a part of the recordings also times
@@ -34,11 +34,13 @@ References
    inference, J. Business & Economic Statistics 28(4); C. B. Hansen (2007), J. Econometrics 141.
 .. [3] R. M. Bell, D. F. McCaffrey (2002), Bias reduction in standard errors for linear regression
    with multi-stage samples, Survey Methodology 28(2).
+.. [4] G. K. Smyth (2004), Linear models and empirical Bayes methods for assessing differential
+   expression, Statistical Applications in Genetics and Molecular Biology 3(1).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache
@@ -58,8 +60,9 @@ MOST_LAGS, SMALL = 12, 0.05
 #: Number of blocks needed in addition to the tested coefficients; and least number of blocks, in
 #: addition to twice the coefficients, for a residual with a long correlation.
 FEWEST_BLOCKS, ENOUGH_BLOCKS = 6, 8
-#: Share of the level that is kept for effects in few blocks (``placebo.py``).
-IN_FEW_BLOCKS = 0.1
+#: Share of the level that is kept for effects in few blocks, and degrees of freedom with which the
+#: noise of these blocks is assumed to be like that of all (``placebo.py``).
+IN_FEW_BLOCKS, LIKE_ELSEWHERE = 0.1, 8.0
 #: Waves per turn from which an unknown function of position cannot represent torque ripple.
 RESOLVED = 40.0
 #: A column of which less than this share is new to the model is not tested.
@@ -564,9 +567,14 @@ class Tester:
         left = [e - z @ b for e, z in zip(residual, new, strict=True)]
         drop = float(score @ b)
         inflation = cache(lambda j: float(variance_inflation(self.problem, [left[j]], [j])[0]))
-        chance = self._stationary(new, left, drop, k, inflation)
+        # The joint with the largest weight of the column, and the slowest possible column.
+        factor = inflation(int(np.argmax([float(np.sum(z**2)) for z in new])))
+        mean = max(sum(float(r @ r) for r in left) / self._free, 1e-300)
+        chance = _tail(drop / k / factor / mean, k, max(2.0, self._free / factor))
         if significant(chance):  # blocks can only raise it
-            chance = max(chance, self._by_blocks(rows, new, left, score, inflation))
+            longest = max(map(inflation, rows))
+            by_blocks = self._by_blocks(new, left, score, factor * mean, longest)
+            chance = max(chance, by_blocks)
         coefficients = np.zeros(len(told))
         coefficients[told] = b / size
         return Test(chance, coefficients, drop)
@@ -609,33 +617,21 @@ class Tester:
         mean = max((self._square - most) / self._free, 1e-300)
         return Test(_tail(most / k / mean, k, self._free), coefficients, drop)
 
-    def _stationary(
-        self,
-        new: list[Array],
-        left: list[Array],
-        drop: float,
-        k: int,
-        inflation: Callable[[int], float],
-    ) -> float:
-        """P-value of the drop for a stationary residual."""
-        # The joint with the largest weight of the column, and the slowest possible column.
-        joint = int(np.argmax([float(np.sum(z**2)) for z in new]))
-        factor = inflation(joint)
-        mean = sum(float(r @ r) for r in left) / self._free
-        free = max(2.0, self._free / factor)
-        return _tail(drop / k / factor / max(mean, 1e-300), k, free)
-
     def _by_blocks(
         self,
-        rows: dict[int, Array],
         new: list[Array],
         left: list[Array],
         score: Array,
-        inflation: Callable[[int], float],
+        stationary: float,
+        inflation: float,
     ) -> float:
-        """P-value of the coefficients for independent scores of blocks."""
+        """P-value of the coefficients for independent scores of blocks.
+
+        Given the variance of the score of an orthonormal column for a stationary residual, and the
+        largest inflation of a variance by correlation.
+        """
         longest = self._duration / (2 * len(score) + ENOUGH_BLOCKS)
-        length = min(block_length(self.problem, map(inflation, rows)), longest)
+        length = min(block_length(self.problem, inflation), longest)
         block, count = time_blocks(self.problem, length)
         index = np.concatenate(block)
         order = np.argsort(index, kind="stable")
@@ -645,21 +641,15 @@ class Tester:
         sums = np.array([columns[rows].T @ residual[rows] for rows in parts])
         grams = np.array([columns[rows].T @ columns[rows] for rows in parts])
         score, sums, share = unbiased_scores(score, sums, grams)
-        k, wald = len(score), _wald(score, sums)
+        k, free = len(score), degrees_of_freedom(share)
         if count < k + FEWEST_BLOCKS:
             return 1.0
-        few = _hotelling(wald, k, min(count - 1.0, self._acting(new, left))) / IN_FEW_BLOCKS
-        many = _hotelling(wald, k, _degrees_of_freedom(share)) / (1.0 - IN_FEW_BLOCKS)
-        return min(1.0, few, many)
-
-
-    def _acting(self, new: list[Array], left: list[Array]) -> float:
-        """Number of independent rows in which some columns act."""
-        sizes = [np.linalg.norm(z, axis=1) for z in new]
-        j = int(np.argmax([float(x @ x) for x in sizes]))
-        power = np.concatenate(sizes) ** 2
-        inflation = variance_inflation(self.problem, [left[j]], [j], [sizes[j]])
-        return float(power.sum() ** 2 / (power @ power) / inflation[0])
+        own = sums.T @ sums
+        both = free * own + LIKE_ELSEWHERE * stationary * np.eye(k)
+        many = _hotelling(score, own, free) / (1.0 - IN_FEW_BLOCKS)
+        free += LIKE_ELSEWHERE
+        few = _hotelling(score, both / free, free) / IN_FEW_BLOCKS
+        return min(1.0, many, few)
 
 
 def _tail(statistic: float, k: float, free: float) -> float:
@@ -684,23 +674,18 @@ def chance_of_score(score: Array, sums: Array) -> float:
     if count < k + FEWEST_BLOCKS:
         return 1.0
     free = count - 1
-    return _hotelling(_wald(score, sums) * free / count, k, free)
+    return _hotelling(score, sums.T @ sums * count / free, free)
 
 
-def _wald(score: Array, sums: Array) -> float:
-    """Square of a score in units of the variance that its sums over blocks show."""
-    spread = sums.T @ sums
-    spread += 1e-12 * np.trace(spread) * np.eye(len(score))
-    return float(score @ np.linalg.solve(spread, score))
-
-
-def _hotelling(wald: float, k: int, free: float) -> float:
-    """P-value of a squared score of k coefficients with some degrees of freedom of its variance."""
-    rest = free - k + 1
+def _hotelling(score: Array, variance: Array, free: float) -> float:
+    """P-value of a score whose variance is an estimate with some degrees of freedom."""
+    k = len(score)
+    variance = variance + 1e-12 * np.trace(variance) * np.eye(k)
+    wald, rest = float(score @ np.linalg.solve(variance, score)), free - k + 1
     return _tail(wald * rest / (k * free), k, rest) if rest > 0 else 1.0
 
 
-def _degrees_of_freedom(share: Array) -> float:
+def degrees_of_freedom(share: Array) -> float:
     """Degrees of freedom of the variance from blocks with some shares of the information.
 
     Twice the squared expectation over the variance of the sum of :func:`unbiased_scores`, for
@@ -781,30 +766,25 @@ def time_blocks(problem: Problem, length: float) -> tuple[list[NDArray[np.int64]
     return rows.split(block), int(number.sum())
 
 
-def block_length(problem: Problem, inflation: Iterable[float]) -> float:
+def block_length(problem: Problem, inflation: float) -> float:
     """Length of blocks of time that are nearly independent, in s.
 
     Parameters
     ----------
     problem : Problem
         Rows.
-    inflation : iterable of float
-        Of the variance, of :func:`variance_inflation`, for some joints.
+    inflation : float
+        Of the variance, the largest of :func:`variance_inflation` of some joints.
     """
-    correlated = problem.rows.hop * max([1.0, *inflation])
-    return float(max(SHORTEST_BLOCK, CORRELATION_TIMES * correlated))
+    return float(max(SHORTEST_BLOCK, CORRELATION_TIMES * problem.rows.hop * inflation))
 
 
 def variance_inflation(
-    problem: Problem,
-    residual: Sequence[Array],
-    joints: Sequence[int] | range,
-    columns: Sequence[Array] | None = None,
+    problem: Problem, residual: Sequence[Array], joints: Sequence[int] | range
 ) -> Array:
-    """Variance of a column's coefficient relative to that for independent rows, by joint.
+    """Variance of a slow column's coefficient relative to that for independent rows, by joint.
 
-    One plus twice the sum of the residual's autocorrelations up to the first small one, each times
-    that of the column.
+    One plus twice the sum of the residual's autocorrelations up to the first small one.
 
     Parameters
     ----------
@@ -814,8 +794,6 @@ def variance_inflation(
         Residual rows of some joints.
     joints : sequence of int
         These joints, from 0.
-    columns : sequence of ndarray of shape (n_rows_j,), optional
-        Column on the rows of each of them; by default, one that is slower than the residual.
 
     Returns
     -------
@@ -823,8 +801,7 @@ def variance_inflation(
     """
     inflation = np.ones(len(joints))
     for i, (j, r) in enumerate(zip(joints, residual, strict=True)):
-        order = problem.rows.in_time(j)
-        x, column = r[order], None if columns is None else columns[i][order]
+        x = r[problem.rows.in_time(j)]
         power = float(x @ x)
         if power <= 0:
             continue
@@ -833,8 +810,6 @@ def variance_inflation(
             rho = float(x[earlier] @ x[earlier + lag]) / power
             if rho < SMALL:
                 break
-            if column is not None:
-                rho *= float(column[earlier] @ column[earlier + lag] / (column @ column))
             inflation[i] += 2 * rho
     return inflation
 
