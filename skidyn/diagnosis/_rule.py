@@ -62,7 +62,7 @@ MOST_LAGS, SMALL = 12, 0.05
 FEWEST_BLOCKS, ENOUGH_BLOCKS = 6, 8
 #: Share of the level that is kept for effects in few blocks, and degrees of freedom with which the
 #: noise of these blocks is assumed to be like that of all (``placebo.py``).
-IN_FEW_BLOCKS, LIKE_ELSEWHERE = 0.1, 8.0
+IN_FEW_BLOCKS, LIKE_ELSEWHERE = 0.1, 16.0
 #: Waves per turn from which an unknown function of position cannot represent torque ripple.
 RESOLVED = 40.0
 #: A column of which less than this share is new to the model is not tested.
@@ -645,11 +645,11 @@ class Tester:
         if count < k + FEWEST_BLOCKS:
             return 1.0
         own = sums.T @ sums
+        many = _hotelling(score, own, free)
         both = free * own + LIKE_ELSEWHERE * stationary * np.eye(k)
-        many = _hotelling(score, own, free) / (1.0 - IN_FEW_BLOCKS)
-        free += LIKE_ELSEWHERE
-        few = _hotelling(score, both / free, free) / IN_FEW_BLOCKS
-        return min(1.0, many, few)
+        free += LIKE_ELSEWHERE  # of a size mostly, so that the number of coefficients takes none
+        few = _tail(float(score @ np.linalg.solve(both, score)) * free / k, k, free)
+        return min(1.0, many / (1.0 - IN_FEW_BLOCKS), few / IN_FEW_BLOCKS)
 
 
 def _tail(statistic: float, k: float, free: float) -> float:
