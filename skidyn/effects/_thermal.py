@@ -19,6 +19,8 @@ _BITTENCOURT = "Bittencourt, Wernholt, Sander-Tavallaey, Brogardh (2010), IROS, 
 
 #: Number of moments, spread over a log, from which friction may have changed.
 _CHANGES = 16
+#: Share of the recording before the last one in which a change that lasts is to be seen.
+_SHOWN = 0.02
 #: Temperature ranges over which the dependence on temperature levels off, K.
 _LEVELLING = ({"levels_over": 6.0}, {"levels_over": 15.0})
 
@@ -35,8 +37,12 @@ def _lasts(signals: Signals, since: float) -> bool:
 
     A single one may differ for many reasons.
     """
-    begun = starts(signals)
-    return bool(len(begun) and signals.clock.min() < since < begun[-1])
+    clock, begun = signals.clock, starts(signals)
+    if not len(begun):
+        return False
+    last = clock[clock < begun[-1]].max()
+    length = last - max(begun[-2:-1], default=clock.min())
+    return bool(clock.min() < since < last - _SHOWN * length)
 
 
 def _constant_temperature(signals: Signals, joint: int) -> str | None:
