@@ -287,10 +287,10 @@ class JudgingSearch(RankingSearch):
         return None
 
     def _acts_on_both(self, candidate: Candidate, together: Sequence[Candidate]) -> bool:
-        """Whether a coupling is not contradicted by one of its two joints.
+        """Whether a coupling is seen on both of its joints, and contradicted by neither.
 
         What depends on the motion of another joint, but has no reaction on it, is not a coupling:
-        most of the reaction would have to be taken back.
+        most of the reaction would have to be taken back, or nothing of it is seen.
         """
         if candidate.kind == UNKNOWN or candidate.term.effect.scope != "pair":
             return True
@@ -299,6 +299,9 @@ class JudgingSearch(RankingSearch):
         beside = tester.beside([candidate.rows])
         for joint, columns in candidate.rows.items():
             own = {joint: columns}
+            rest = [{j: other} for j, other in candidate.rows.items() if j != joint]
+            if tester.beside(rest).test(own).chance > self.settings.member:
+                return False
             torque, change = columns @ size, columns @ beside.estimate(own)[0]
             taken_back = torque @ change < -TAKEN_BACK * (torque @ torque)
             if taken_back and self.significant(beside.test(own).chance, candidate):
