@@ -13,6 +13,7 @@ from skidyn.diagnosis._followed_signals import Followed, followed_signals
 from skidyn.diagnosis._hypothesis import UNKNOWN
 from skidyn.diagnosis._spectrum import SLOWEST
 from skidyn.effects import (
+    ClockPeriodic,
     FunctionOfSignals,
     FunctionOfSum,
     NamelessEffect,
@@ -79,10 +80,10 @@ def nameless_candidates(
                 shapes = [effect.shape_of(few, names) for names in sets]
             if isinstance(effect, FunctionOfSum):
                 shapes = [effect.shape_of(few, *of) for of in followed[joint].sums]
-            if effect.search == "clock":
+            if isinstance(effect, ClockPeriodic):
                 line = clock_line(
                     problem.signals,
-                    residual[:, joint],
+                    residual[:, joint] * effect.carriers(problem.signals, joint)[-1],
                     problem.rows.sliding[:, joint],
                     problem.signals.rate,
                     (LOWEST, SLOWEST),

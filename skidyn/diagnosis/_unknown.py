@@ -115,7 +115,7 @@ def describe_unknowns(
         effect = term.effect
         assert isinstance(effect, NamelessEffect)
         guessed = effect.variables(term.places[0], dict(term.shape))
-        if effect.scope == "robot":  # as a force at the tool
+        if "robot" in effect.needs:  # the position of the tool is not one of the signals
             for joint in term.places:
                 own = (f"q{joint + 1}",)
                 shape = _shape(problem, term, joint, whole[span], left[:, span], own)

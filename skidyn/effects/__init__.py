@@ -41,6 +41,7 @@ from skidyn.effects._hysteresis import Law as Law, PathMemory as PathMemory
 from skidyn.effects._moments import starts as starts
 from skidyn.effects._motor_load import MotorLoadFriction as MotorLoadFriction
 from skidyn.effects._nameless import (
+    ClockPeriodic as ClockPeriodic,
     FunctionOfSignals as FunctionOfSignals,
     FunctionOfSum as FunctionOfSum,
     NamelessEffect as NamelessEffect,

@@ -26,6 +26,7 @@ from skidyn.effects._motor_load import MOTOR_LOAD
 from skidyn.effects._nameless import NAMELESS
 from skidyn.effects._nameless_coupled import COUPLED
 from skidyn.effects._nameless_history import HISTORY
+from skidyn.effects._nameless_tool import AT_TOOL
 from skidyn.effects._position import PositionDependentFriction, TorqueRipple
 from skidyn.effects._registry import get_effect, register_effect
 from skidyn.effects._sensor import Saturation, TimeDelay, TorqueGain
@@ -72,7 +73,7 @@ _CLASSES: tuple[type[Effect], ...] = (
     *MOTOR_LOAD,
     *SERVO,
 )
-for _cls in (*_CLASSES, *NAMELESS, *HISTORY, *COUPLED, AccelerationNoise, Formula):
+for _cls in (*_CLASSES, *NAMELESS, *HISTORY, *AT_TOOL, *COUPLED, AccelerationNoise, Formula):
     register_effect(_cls)
 
 #: What users may write for a term: a kind, a kind with joints counted from 1, or a Term.

@@ -155,6 +155,29 @@ class FrictionOverPosition(NamelessEffect):
         return np.column_stack([*(w * dq for w in waves), *(w * sign for w in waves[:2])])
 
 
+class FunctionOfPositionAndVelocity(_Spline):
+    """A torque that depends on the joint's own position and velocity, in low orders.
+
+    Unlike friction, it may act in one direction, as a push that occurs only during motion.
+    """
+
+    kind = "function_of_position_and_velocity"
+    drawn_against = "dq"
+    title = "Function of position and velocity"
+    formula = r"f(q_j, \dot q_j)"
+    coefficients = unnamed_coefficients(9)
+    depends_on = ("q_own", "dq_own")
+    softness = 1e-5
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        low, high = shape["low"], shape["high"]
+        inside = (2 * signals.q[:, joint] - low - high) / (high - low)
+        orders = continued(lambda t: np.asarray(legvander(t, 2)), inside, -1.0, 1.0)
+        dq = signals.dq[:, joint]
+        motion = (dq, signals.sign[:, joint], np.abs(dq))
+        return np.hstack([orders * m[:, None] for m in motion])
+
+
 class _WithOther(NamelessEffect):
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         return self.others(signals, joints[0])
@@ -389,6 +412,16 @@ class FunctionOfTwoSignals(FunctionOfSignals):
     n_signals = 2
 
 
+class LowOrderOfTwoSignals(FunctionOfSignals):
+    """A function of two signals of any joints in low orders, which a short log determines."""
+
+    kind = "low_order_of_two_signals"
+    title = "Function of two signals in low orders"
+    formula = r"f(s_1, s_2)"
+    coefficients = unnamed_coefficients(10)
+    n_signals = 2
+
+
 class FunctionOfThreeSignals(FunctionOfSignals):
     """A function of three signals of any joints."""
 
@@ -530,13 +563,17 @@ class ClockPeriodic(NamelessEffect):
     title = "Periodic in time"
     formula = r"\sum_h a_h\sin(2\pi h f t) + b_h\cos(2\pi h f t)"
     coefficients = unnamed_coefficients(8)
-    depends_on = ("time",)
+    depends_on: ClassVar[tuple[str, ...]] = ("time",)
     needs = ("time",)
     search = "clock"
     #: Waves per period: a square wave has the odd ones.
     harmonics: ClassVar[tuple[int, ...]] = (1, 2, 3, 5)
     #: Highest frequency in Hz that averaged rows contain; higher waves are left out.
     highest: ClassVar[float] = 8.0
+
+    def carriers(self, signals: Signals, joint: int) -> list[Array]:
+        """What the waves are multiplied by, each of shape (n_samples,)."""
+        return [np.ones(signals.n_samples)]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         phase = 2 * np.pi * shape["frequency"] * signals.clock
@@ -546,7 +583,38 @@ class ClockPeriodic(NamelessEffect):
             for h, s in zip(self.harmonics, shown, strict=True)
             for wave in (np.sin, np.cos)
         ]
-        return np.column_stack(waves)
+        carriers = self.carriers(signals, joint)
+        return np.column_stack([carrier * wave for carrier in carriers for wave in waves])
+
+
+class PulsatingFriction(ClockPeriodic):
+    """Friction periodic in time: a brake that drags at times, a pulsing pressure on a seal."""
+
+    kind = "pulsating_friction"
+    drawn_against = "dq"
+    title = "Friction periodic in time"
+    formula = r"\mathrm{sign}\,\dot q_j\sum_h a_h\sin(2\pi h f t) + b_h\cos(2\pi h f t)"
+    depends_on = ("dq_own", "time")
+    is_of_one_number = True
+
+    def carriers(self, signals: Signals, joint: int) -> list[Array]:
+        return [signals.sign[:, joint]]
+
+
+class PulsatingSpring(ClockPeriodic):
+    """A torque over the position that is periodic in time: an air spring that breathes."""
+
+    kind = "pulsating_spring"
+    drawn_against = "q"
+    title = "Spring periodic in time"
+    formula = r"(q_j - q_0)\sum_h a_h\sin(2\pi h f t) + b_h\cos(2\pi h f t)"
+    depends_on = ("q_own", "time")
+    is_of_one_number = True
+    harmonics = (1, 2)
+
+    def carriers(self, signals: Signals, joint: int) -> list[Array]:
+        x = signals.q[:, joint] / signals.unit[joint]
+        return [np.ones(signals.n_samples), x]
 
 
 class Vibration(NamelessEffect):
@@ -571,14 +639,18 @@ NAMELESS: tuple[type[NamelessEffect], ...] = (
     FunctionOfPosition,
     FunctionOfVelocity,
     FrictionOverPosition,
+    FunctionOfPositionAndVelocity,
     FunctionOfTwoPositions,
     FrictionOverOtherPosition,
     FunctionOfTwoVelocities,
     FunctionOfSignal,
     FunctionOfTwoSignals,
+    LowOrderOfTwoSignals,
     FunctionOfThreeSignals,
     FunctionOfSum,
     TorqueBetweenTwoJoints,
     ClockPeriodic,
+    PulsatingFriction,
+    PulsatingSpring,
     Vibration,
 )

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Unknown torques that depend on history or on the position of the tool."""
+"""Unknown torques that depend on history."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -12,7 +11,7 @@ from numpy.polynomial.legendre import legvander
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Shape
-from skidyn.effects._hysteresis import dahl_state, stop_along, strokes_of
+from skidyn.effects._hysteresis import cut_strokes, dahl_state, stop_along, strokes_of
 from skidyn.effects._moments import moments
 from skidyn.effects._nameless import (
     NamelessEffect,
@@ -20,12 +19,13 @@ from skidyn.effects._nameless import (
     supported_range,
     unnamed_coefficients,
 )
-from skidyn.effects._tool import tool_jacobian, tool_position
 
 #: Distances since the last reversal, rad or tenths of m, over which a torque may fade.
 _WAYS = (0.01, 0.03, 0.1, 0.3)
 #: Widths of play, as shares of the range of a position, and number of splines of the function.
 _PLAYS, _LAGGING = (0.03, 0.06, 0.1, 0.15, 0.22, 0.33, 0.5), 16
+#: Widths of stop operators, as shares of the range of a torque.
+_STOPS = (0.05, 0.1, 0.2, 0.4)
 #: Times in s over which a torque may relax.
 _RELAXATION = (0.1, 0.3, 1.0, 3.0)
 #: Least number of recordings for a torque that drifts.
@@ -34,10 +34,10 @@ _DRIFTING = 5
 _MOMENTS = 32
 #: Times since the start of a recording over which a torque may fade, as shares of its length.
 _FADING = (0.05, 0.15, 0.5)
-
-
-#: Number of places at which a force is tried, and its widths as shares of the extent of the motion.
-_PLACES, _WIDTHS = 24, (0.08, 0.16, 0.3)
+#: Number of splines of a function of the position of the last reversal.
+_TURNING = 12
+#: Times in s over which what a motion warmed cools again.
+_COOLING = (0.5, 2.0, 8.0)
 
 
 class FunctionOfTimeSinceStart(NamelessEffect):
@@ -149,6 +149,113 @@ class FunctionOfWaySinceReversal(NamelessEffect):
         return np.hstack([fading, fading * signals.sign[:, [joint]]])
 
 
+class _OfAnyJoint(NamelessEffect):
+    """A torque that depends on the history of any joint, this one included."""
+
+    is_of_one_number = True
+    depends_on: ClassVar[tuple[str, ...]] = ("q_other", "dq_other")
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        return [{"other": k} for k in range(signals.n_joints)]
+
+
+class FunctionOfLastReversal(_OfAnyJoint):
+    """A torque that remembers where a joint turned round last: a dragged cable, a slack chain."""
+
+    kind = "function_of_last_reversal"
+    title = "Function of the position of the last reversal"
+    formula = r"f(q_{k,\mathrm{turn}})"
+    coefficients = unnamed_coefficients(_TURNING)
+    softness = 2e-3
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        k = int(shape["other"])
+        turned = signals.once(("last reversal", k), lambda: _last_reversal(signals, k))
+        return splines(turned, *supported_range(signals, signals.q[:, k]), _TURNING)
+
+
+class FrictionAfterMotion(_OfAnyJoint):
+    """Friction that depends on how much a joint has moved recently: a brake, grease, a damper.
+
+    It is proportional to the square of a velocity, averaged over the recent past, as a temperature
+    is.
+    """
+
+    kind = "friction_after_motion"
+    drawn_against = "dq"
+    title = "Friction that depends on recent motion"
+    formula = r"(a\,\dot q_j + b\,\mathrm{sign}\,\dot q_j)\,h,\quad T\,\dot h = \dot q_k^2 - h"
+    coefficients = unnamed_coefficients(2 * len(_COOLING))
+    depends_on = ("dq_own", "dq_other")
+    needs = ("time",)
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        k = int(shape["other"])
+        heat = signals.once(
+            ("recent motion", k),
+            lambda: [_followed(signals.dq[:, k] ** 2, signals, time) for time in _COOLING],
+        )
+        motion = signals.dq[:, joint], signals.sign[:, joint]
+        return np.column_stack([h * m for m in motion for h in heat])
+
+
+class TorqueOfLargestPosition(_OfAnyJoint):
+    """A torque that remembers how far a joint has been: a stretched cover, a hose that was pushed.
+
+    Linear in the distance from the largest and from the smallest position in the recording so far.
+    """
+
+    kind = "torque_of_largest_position"
+    title = "Torque that depends on the largest position so far"
+    formula = r"a\,(\max_{s \leq t} q_k(s) - q_k) + b\,(q_k - \min_{s \leq t} q_k(s))"
+    coefficients = unnamed_coefficients(2)
+    depends_on = ("q_other",)
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        q = signals.q[:, int(shape["other"])]
+        columns = np.zeros((signals.n_samples, 2))
+        for rows in signals.segments:
+            own = q[rows]
+            columns[rows, 0] = np.maximum.accumulate(own) - own
+            columns[rows, 1] = own - np.minimum.accumulate(own)
+        return columns
+
+
+class HysteresisOverLoad(NamelessEffect):
+    """A hysteresis of the joint's own torque: a flexspline, a sensor that lags its load.
+
+    A sum of stop operators [1]_.
+
+    References
+    ----------
+    .. [1] A. Visintin (1994), Differential models of hysteresis, Springer, chapter III.
+    """
+
+    is_of_one_number = True
+    kind = "hysteresis_over_load"
+    drawn_against = "load"
+    title = "Hysteresis over the load"
+    formula = r"\sum_i c_i\,\mathcal{S}_{r_i}[\tau]"
+    coefficients = unnamed_coefficients(len(_STOPS))
+    needs = ("model_torque",)
+
+    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
+        return (f"tau{joint + 1}",)
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        if signals.model_torque is None:
+            return []
+        low, high = supported_range(signals, signals.model_torque[:, joints[0]])
+        return [{"range": high - low}] if high > low else []
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        assert signals.model_torque is not None
+        strokes = cut_strokes(signals.model_torque[:, joint], signals.segments)
+        return np.column_stack(
+            [stop_along(strokes, signals.n_samples, share * shape["range"]) for share in _STOPS]
+        )
+
+
 class FunctionOfLaggingPosition(NamelessEffect):
     """A torque with play: a function of a position that lags behind by some play.
 
@@ -233,131 +340,15 @@ def _followed(x: Array, signals: Signals, time_constant: float) -> Array:
     return y
 
 
-class _AtTool(NamelessEffect):
-    scope = "robot"
-    needs = ("robot",)
-    follows: ClassVar[tuple[str, ...]] = ("tool position",)
-
-    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
-        return self.follows
-
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        return [] if signals.robot is None else self.tried(signals, tool_position(signals))
-
-    def tried(self, signals: Signals, position: Array) -> list[dict[str, Any]]:
-        """Shapes for a motion with these positions of the tool, (n_samples, 3)."""
-        raise NotImplementedError
-
-
-class DragOnTool(_AtTool):
-    """A drag on the tool that depends on its height: a bath, air, brushes."""
-
-    kind = "drag_on_tool"
-    drawn_against = "dq"
-    title = "Drag on the tool"
-    formula = r"J_n(q)^\top c(z(q))\,v"
-    coefficients = unnamed_coefficients(10)
-    softness = 2e-3
-    follows = ("tool position", "tool velocity")
-
-    def tried(self, signals: Signals, position: Array) -> list[dict[str, Any]]:
-        low, high = supported_range(signals, position[:, 2])
-        return [{"low": low, "high": high}] if high > low else []
-
-    def torque_columns(
-        self, signals: Signals, joints: Sequence[int], **shape: Any
-    ) -> dict[int, Array]:
-        height = tool_position(signals)[:, 2]
-        field = splines(height, shape["low"], shape["high"], len(self.coefficients))
-        jacobian = tool_jacobian(signals)
-        velocity = np.einsum("ian,in->ia", jacobian, signals.dq)
-        return {j: np.sum(jacobian[:, :, j] * velocity, axis=1)[:, None] * field for j in joints}
-
-
-class ForceOverToolPosition(_AtTool):
-    """A force on the tool that depends on its position: a field, a hose, a cloth."""
-
-    kind = "force_over_tool_position"
-    title = "Force that depends on the position of the tool"
-    formula = r"-J_n(q)^\top f(p(q))"
-    coefficients = unnamed_coefficients(30)
-
-    def tried(self, signals: Signals, position: Array) -> list[dict[str, Any]]:
-        low, high = np.quantile(position, [0.005, 0.995], axis=0)
-        return [{"low": tuple(map(float, low)), "high": tuple(map(float, high))}]
-
-    def torque_columns(
-        self, signals: Signals, joints: Sequence[int], **shape: Any
-    ) -> dict[int, Array]:
-        field = _quadratics(tool_position(signals), shape["low"], shape["high"])
-        jacobian = tool_jacobian(signals)
-        return {
-            j: np.hstack([-jacobian[:, axis, [j]] * field for axis in range(3)]) for j in joints
-        }
-
-
-class ForceNearPoint(_AtTool):
-    """A force on the tool near one place: an edge, a magnet, a curtain."""
-
-    kind = "force_near_point"
-    title = "Force near a point"
-    formula = r"-J_n(q)^\top (f + c\,(p - p_0) / w) \exp(-|p - p_0|^2 / 2 w^2)"
-    coefficients = unnamed_coefficients(4)
-    shapes = (
-        *(Shape(axis, "m", (), -np.inf, np.inf, spacing="linear", scales=False) for axis in "xyz"),
-        Shape("width", "m", (), 1e-3, 1e2, scales=False),
-    )
-
-    def tried(self, signals: Signals, position: Array) -> list[dict[str, Any]]:
-        places = _spread_out(position, _PLACES)
-        reach = self.travel(signals, (), {})
-        return [
-            dict(zip("xyz", map(float, place), strict=True)) | {"width": share * reach}
-            for place in places
-            for share in _WIDTHS
-        ]
-
-    def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        return float(np.max(np.ptp(tool_position(signals), axis=0)))
-
-    def torque_columns(
-        self, signals: Signals, joints: Sequence[int], **shape: Any
-    ) -> dict[int, Array]:
-        position = tool_position(signals)
-        point = np.array([shape[axis] for axis in "xyz"])
-        away = (position - point) / max(shape["width"], 1e-9)
-        near = np.exp(-0.5 * np.einsum("ia,ia->i", away, away))[:, None]
-        jacobian = tool_jacobian(signals)
-        radial = np.einsum("iaj,ia->ij", jacobian, away)
-        columns = {}
-        for j in joints:
-            columns[j] = -near * np.column_stack([radial[:, j], jacobian[:, :, j]])
-        return columns
-
-
-def _quadratics(position: Array, low: Sequence[float], high: Sequence[float]) -> Array:
-    """Polynomials of a place up to order two, (n_samples, 10)."""
-    least, most = np.array(low), np.array(high)
-    span = np.where(most - least > 1e-6, most - least, np.inf)
-    orders = legvander(np.clip((2 * position - least - most) / span, -1.0, 1.0), 2)
-    return np.column_stack(
-        [
-            orders[:, 0, a] * orders[:, 1, b] * orders[:, 2, c]
-            for a, b, c in itertools.product(range(3), repeat=3)
-            if a + b + c <= 2
-        ]
-    )
-
-
-def _spread_out(points: Array, count: int) -> Array:
-    """Some of the points, each as far as possible from those before it."""
-    thin = points[:: max(1, len(points) // 2000)]
-    chosen = [thin[int(np.argmin(np.sum((thin - thin.mean(0)) ** 2, axis=1)))]]
-    distance = np.sum((thin - chosen[0]) ** 2, axis=1)
-    while len(chosen) < count:
-        chosen.append(thin[int(np.argmax(distance))])
-        distance = np.minimum(distance, np.sum((thin - chosen[-1]) ** 2, axis=1))
-    return np.array(chosen)
+def _last_reversal(signals: Signals, joint: int) -> Array:
+    """Position at which a joint turned round last; that of the start before it has turned."""
+    turned = np.array(signals.q[:, joint])
+    for rows in signals.segments:
+        turned[rows] = turned[rows.start]
+    strokes = strokes_of(signals, joint)
+    way = strokes.direction[strokes.stroke] * strokes.way
+    turned[strokes.rows] = signals.q[strokes.rows, joint] - way
+    return turned
 
 
 def _since_start(signals: Signals) -> Array:
@@ -375,10 +366,11 @@ HISTORY: tuple[type[NamelessEffect], ...] = (
     FunctionOfTimeSinceStart,
     FrictionSinceReversal,
     FunctionOfWaySinceReversal,
+    FunctionOfLastReversal,
+    FrictionAfterMotion,
+    TorqueOfLargestPosition,
+    HysteresisOverLoad,
     FunctionOfLaggingPosition,
     FunctionOfLaggingVelocity,
     RelaxingSpring,
-    DragOnTool,
-    ForceOverToolPosition,
-    ForceNearPoint,
 )

@@ -29,6 +29,14 @@ FORMS = {
     "fades after a reversal": (1, 1.0, lambda x: _since_reversal(x, "q1"), {"q1", "dq1"}, None),
     "snaps over": (2, 0.6, lambda x: _snapped(x, "q2", 0.15), {"q2"}, None),
     "relaxes": (2, 1.8, lambda x: _relaxed(x, "q2", 0.5), {"q2", "dq2"}, None),
+    "remembers a reversal": (1, 0.3, lambda x: _last_turn(x, "q2"), {"q2", "dq2"}, None),
+    "pushes during motion": (
+        2,
+        0.4,
+        lambda x: x["dq2"].abs() * (x["q2"] - x["q2"].median()),
+        {"q2", "dq2"},
+        None,
+    ),
     "bump": (2, 1.2, lambda x: np.exp(-((x["q2"] / 0.15) ** 2)), {"q2"}, None),
 }
 #: Forms for which the signals are chosen among those of six joints.
@@ -40,6 +48,8 @@ TOGETHER = [
     ("step", "bump"),
     pytest.param(("fades after a reversal", "relaxes"), marks=pytest.mark.slow),
     pytest.param(("snaps over",), marks=pytest.mark.slow),
+    ("remembers a reversal",),
+    pytest.param(("pushes during motion",), marks=pytest.mark.slow),
 ]
 LENGTH = {"n_trajectories": 6, "duration": 6.0}
 SHORT = {"n_trajectories": 4, "duration": 4.0}
@@ -55,6 +65,16 @@ def _since_reversal(x, name):
         turn = turns[np.maximum(np.searchsorted(turns, np.arange(len(q)), "right") - 1, 0)]
         way[rows] = np.abs(q - q[turn]) / 0.2
     return way * np.exp(1 - way)
+
+
+def _last_turn(x, name):
+    """Position of the last reversal, or of the start before the first one."""
+    held = np.zeros(len(x))
+    for _, rows in x.groupby("trajectory").indices.items():
+        q = x[name].to_numpy()[rows]
+        turns = np.r_[0, np.flatnonzero(np.diff(np.sign(np.diff(q)))) + 1]
+        held[rows] = q[turns[np.searchsorted(turns, np.arange(len(q)), "right") - 1]]
+    return np.tanh(1.5 * held)
 
 
 def _snapped(x, name, play):

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Columns of nameless torques that follow history or the place of the tool."""
+"""Columns of nameless torques that depend on history."""
 
 import numpy as np
 import pytest
 
-from skidyn.effects import Term, get_effect
+from skidyn.effects import get_effect
 
 
 @pytest.mark.parametrize("kind", ["function_of_lagging_position", "function_of_lagging_velocity"])
@@ -33,17 +33,6 @@ def test_what_relaxes_follows_the_position_and_fades(signals):
         assert column[120] == pytest.approx(expected, rel=0.06)
 
 
-def test_a_drag_takes_energy_from_the_tool(signals, robot):
-    position = robot.forward_kinematics(signals.q)[0][:, 2]
-    shape = {"low": position.min() - 0.01, "high": position.max() + 0.01}
-    term = Term("drag_on_tool", (1, 2), shape)
-    columns = term.torque_columns(signals)
-    power = sum(c.sum(axis=1) * signals.dq[:, j] for j, c in columns.items())
-    jacobian = robot.jacobian(signals.q)[:, :3]
-    velocity = np.einsum("ian,in->ia", jacobian, signals.dq)
-    np.testing.assert_allclose(power, np.sum(velocity**2, axis=1), atol=1e-9)
-
-
 def test_a_drift_over_the_log_needs_several_recordings_and_stays_beyond_it(signals):
     effect = get_effect("function_of_time")
     assert "too few recordings" in effect.not_shown(signals, 0)
@@ -62,3 +51,53 @@ def test_an_offset_that_sets_in_stays_and_is_called_by_its_moment(signals):
     column = effect.columns(signals, 0, moment=moment)[:, 0]
     np.testing.assert_array_equal(column, signals.clock >= moment)
     assert f"{moment:.6g} s" in effect.words({"moment": moment})
+
+
+def test_what_remembers_a_reversal_keeps_its_torque_until_the_next_one(signals):
+    fading = signals.with_(q=signals.q * np.exp(-0.2 * signals.time)[:, None])
+    effect = get_effect("function_of_last_reversal")
+    assert effect.grid(fading, (0,)) == [{"other": 0}, {"other": 1}]
+    assert effect.variables(0, {"other": 1}) == ("q2", "dq2")
+    columns = effect.columns(fading, 0, other=1)
+    direction = np.sign(np.diff(fading.q[:, 1]))
+    same = (direction[1:] == direction[:-1]) & (np.diff(fading.trajectory)[1:] == 0)
+    changed = np.abs(columns[2:] - columns[1:-1]).max(axis=1) > 1e-9
+    assert not changed[same].any()
+    assert changed.sum() >= 3
+
+
+def test_friction_after_motion_needs_both_motions(signals):
+    effect = get_effect("friction_after_motion")
+    assert effect.variables(0, {"other": 1}) == ("dq1", "dq2")
+    still = signals.with_(dq=signals.dq * [1.0, 0.0])
+    assert (effect.columns(still, 0, other=1) == 0).all()
+    # what a joint warmed cools after it has come to rest
+    stops = signals.with_(dq=signals.dq * [[1.0, 1.0]] * (signals.time < 2.0)[:, None] + [1e-3, 0])
+    warmed = np.abs(effect.columns(stops, 0, other=1)[:, 0] / stops.dq[:, 0])
+    assert warmed[299] < 0.2 * warmed[199]
+
+
+def test_a_cover_remembers_how_far_a_joint_has_been(signals):
+    effect = get_effect("torque_of_largest_position")
+    columns = effect.columns(signals, 0, other=1)
+    assert (columns >= 0).all()
+    first = slice(0, 300)
+    q = signals.q[first, 1]
+    largest = np.array([q[: i + 1].max() for i in range(300)])
+    np.testing.assert_allclose(columns[first, 0], largest - q)
+    assert (columns[300] == 0).all()  # every recording begins anew
+
+
+def test_a_sensor_that_lags_its_load_is_a_hysteresis_of_the_torque(signals):
+    effect = get_effect("hysteresis_over_load")
+    (shape,) = effect.grid(signals, (0,))
+    assert effect.variables(0, shape) == ("tau1",)
+    columns = effect.columns(signals, 0, **shape)
+    torque, play = signals.model_torque[:, 0], 0.1 * shape["range"]
+    lagging = np.zeros(600)
+    for rows in signals.segments:
+        at = torque[rows.start]
+        for i in range(rows.start, rows.stop):
+            at = min(max(at, torque[i] - play), torque[i] + play)
+            lagging[i] = at
+    np.testing.assert_allclose(torque - lagging, play * columns[:, 1], atol=1e-9)
