@@ -10,6 +10,8 @@ from itertools import islice
 
 #: Number of names that are compared with a misspelt one, and of their letters, to limit the time.
 TRIED, LONGEST_TRIED = 500, 60
+#: Difference of the two parts of an interval, as a share of it, from which both ends are stated.
+SKEWED = 0.2
 #: Titles that begin with the name of a person or a model.
 NAMES = ("Coulomb", "Dahl", "LuGre", "Maxwell", "Stribeck")
 
@@ -110,6 +112,18 @@ def listed(parts: Sequence[str], word: str = "and") -> str:
     return f" {word} ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else list(parts))
 
 
+def interval_told(value: float, low: float, high: float) -> str:
+    """A value with its interval: half of it, or both ends if they are not equally far.
+
+    >>> interval_told(3.5, 3.1, 3.9), interval_told(17.0, 0.02, 14200.0)
+    ('3.50 ± 0.40', '17 (0.020 to 1.4e+04)')
+    """
+    below, above = value - low, high - value
+    if not abs(above - below) > SKEWED * (high - low):
+        return give_or_take(value, (high - low) / 2)
+    return f"{digits(value)} ({digits(low)} to {digits(high)})"
+
+
 def measure(name: str, value: object, unit: str = "") -> str:
     """A parameter with half its interval, if that is known; the unit ``"1"`` means none.
 
@@ -118,7 +132,7 @@ def measure(name: str, value: object, unit: str = "") -> str:
     """
     if isinstance(value, tuple) and len(value) == 3:
         middle, low, high = value
-        text = give_or_take(middle, (high - low) / 2)
+        text = interval_told(middle, low, high)
     else:
         text = digits(value) if isinstance(value, float) else str(value)
     return f"{name} = {text.replace('-', '−')}{'' if unit in ('', '1') else f' {raised(unit)}'}"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn._text import give_or_take, inside, joints_told, listed, trajectories_told
+from skidyn._text import inside, interval_told, joints_told, listed, trajectories_told
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._episodes import Episode
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis
@@ -348,7 +348,7 @@ def _value(name: str, row: dict[str, Any]) -> str:
     """Text of a parameter of a finding."""
     value, unit = row["value"], "" if row["unit"] == "1" else f" {row['unit']}".rstrip()
     if isinstance(value, float) and row["low"] is not None:
-        return f"{name} = {give_or_take(value, (row['high'] - row['low']) / 2)}{unit}"
+        return f"{name} = {interval_told(value, row['low'], row['high'])}{unit}"
     return ""
 
 

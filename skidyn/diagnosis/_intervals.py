@@ -30,6 +30,9 @@ CONFIDENCE = 0.95
 #: Relative step of the derivative with respect to a shape parameter; largest change of a torque by
 #: it, relative to the torque; divisor of a step with a larger change, as of a fine ripple.
 STEP, LARGEST_CHANGE, SMALLER = 0.02, 0.3, 8.0
+#: Largest logarithm of the ratio of an end of an interval to the value: nearly any size is
+#: possible.
+LARGEST_LOG = 7.0
 
 
 def parameter_intervals(
@@ -54,7 +57,7 @@ def parameter_intervals(
     dict of Term to dict of str to (value, low, high), or to a plain value where it has none
     """
     blocks = [problem.term_rows(t) for t in terms]
-    whole, _ = left_out_coefficients(
+    whole, held = left_out_coefficients(
         problem, problem.design(blocks), sigma, problem.target, soft=problem.soft(terms)
     )
     places = list(TermSum(terms).slices(len(problem.rigid_index)))
@@ -82,8 +85,10 @@ def parameter_intervals(
                     whole[own] + coefficients[own] - full[own], problem.signals
                 )
             )
+        not_zero = _half_width(held[:, own]) < np.abs(whole[own])
+        sure = {c.name for c, sure in zip(term.coefficients, not_zero, strict=True) if sure}
         result[term] = {
-            name: _interval(number, [r[name] for r in replicates if name in r])
+            name: _interval(number, [r[name] for r in replicates if name in r], name in sure)
             for name, number in value.items()
         }
     return result
@@ -133,11 +138,25 @@ def _spacing(shape: Shape) -> float:
     return float(np.diff(grid).max())
 
 
-def _interval(value: Any, replicates: Sequence[Any]) -> Any:
+def _half_width(replicates: Array) -> Array:
+    """Half the width of the interval of each column of values with one fold left out."""
+    quantile = student_t.ppf(0.5 + CONFIDENCE / 2, len(replicates) - 1)
+    return np.asarray(quantile * jackknife(replicates))
+
+
+def _interval(value: Any, replicates: Sequence[Any], not_zero: bool) -> Any:
+    """Value with its interval: symmetric for the value, or for its logarithm.
+
+    An uncertain shape, such as the exponent of a power, may make the size uncertain although it is
+    not zero with any single shape. Then the interval is that of its logarithm.
+    """
     if not isinstance(value, float | int) or isinstance(value, bool):
         return value
-    values = np.array(replicates, dtype=float)
-    half = float(student_t.ppf(0.5 + CONFIDENCE / 2, len(values) - 1) * jackknife(values))
+    half = float(_half_width(np.array(replicates, dtype=float)))
     if half <= 1e-9 * abs(value):
         return value  # was not estimated
+    if not_zero and half >= abs(value):
+        factor = float(np.exp(min(half / abs(value), LARGEST_LOG)))
+        low, high = sorted((value / factor, value * factor))
+        return (float(value), low, high)
     return (float(value), float(value) - half, float(value) + half)

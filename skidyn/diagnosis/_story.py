@@ -11,8 +11,8 @@ import numpy as np
 from skidyn._text import (
     digits,
     fall,
-    give_or_take,
     inside,
+    interval_told,
     joints_told,
     listed,
     raised,
@@ -359,7 +359,7 @@ def _parameters(finding: Finding) -> tuple[list[str], list[float]]:
         )
         bounds = list(zip(values, lows, highs, strict=True))
         numbers = [
-            v if low is None or low == high else give_or_take(v, (high - low) / 2)
+            v if low is None or low == high else interval_told(v, low, high)
             for v, low, high in bounds
         ]
         told = [digits(v) if isinstance(v, float) else str(v) for v in numbers]

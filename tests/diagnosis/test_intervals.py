@@ -41,3 +41,33 @@ def test_a_fine_ripple_has_narrow_intervals_of_its_waves_and_size():
     waves, size = (ripple.parameters[name] for name in ("N", "A"))
     assert waves["low"] < 60 < waves["high"] and waves["high"] - waves["low"] < 0.1
     assert size["high"] - size["low"] < 0.1 * size["value"]
+
+
+@pytest.mark.slow
+def test_a_size_that_an_uncertain_shape_leaves_open_is_not_zero(spring_log):
+    # at slow motion, the torque at 1 rad/s is extrapolated with an uncertain exponent
+    robot = spring_log.robot
+    log = make_hidden_effect_log(robot, None, n_trajectories=6, duration=6.0, random_state=2)
+    X = log.X.copy()
+    X["time"] *= 10
+    for joint in (1, 2):
+        X[f"dq{joint}"] /= 10
+        X[f"ddq{joint}"] /= 100
+    motion = [X[[f"{s}{j}" for j in (1, 2)]].to_numpy() for s in ("q", "dq", "ddq")]
+    y = robot.inverse_dynamics(*motion) + np.random.default_rng(0).normal(0, 0.02, (len(X), 2))
+    y[:, 0] += 1.0 * np.abs(motion[1][:, 0]) ** 2.5 * np.sign(motion[1][:, 0])
+    model = RBDRegressor(robot, ("viscous", ("nonlinear_viscous", [1])))
+    diagnosis = diagnose(model, X, y, checks=(), effects=[])
+    problem, noise = diagnosis.problem, diagnosis.result.fit.noise
+    (term,) = [t for t in problem.terms if t.kind == "nonlinear_viscous"]
+    terms = [t.with_shape(power=2.5) if t is term else t for t in problem.terms]
+    free, held = (
+        {t.kind: v for t, v in parameter_intervals(problem, terms, noise, shapes).items()}
+        for shapes in (True, False)
+    )
+    (value, low, _) = held["nonlinear_viscous"]["c"]
+    assert low > 0
+    (same, least, most) = free["nonlinear_viscous"]["c"]
+    assert same == value
+    assert 0 < least < 1.0 < most
+    assert most - value > value  # an interval that is symmetric about the value would contain zero
