@@ -20,7 +20,7 @@ from skidyn.diagnosis._hypothesis import (
     simplicity_of,
     within_recordings,
 )
-from skidyn.diagnosis._ranking import RankingSearch
+from skidyn.diagnosis._ranking import NEARLY, RankingSearch
 from skidyn.diagnosis._rule import ALL_LEFT, NEARER, TAKEN_BACK
 from skidyn.effects import NamelessEffect, get_effect
 from skidyn.evidence import weighted_least_squares
@@ -530,8 +530,10 @@ class JudgingSearch(RankingSearch):
     def _elsewhere(self, best: Hypothesis) -> tuple[tuple[int, ...], ...]:
         """Other pairs of joints on which a coupling explains equally much.
 
-        With parallel axes, the bodies compensate the difference between pairs.
+        With parallel axes, the bodies compensate the difference between pairs, so that a small one
+        is no evidence.
         """
+        close = max(self.settings.least_gain, (1 - NEARLY) * best.score)
         pairs = [c for c in best.candidates if len(c.joints) == 2]
         if best.kind == UNKNOWN or within_recordings(best) or not pairs:
             return ()
@@ -546,6 +548,6 @@ class JudgingSearch(RankingSearch):
             found += [
                 h.candidates[-1].joints
                 for h in self._finals([[*rest, other] for other in near], refined=len(near))
-                if best.score - h.score < self.settings.least_gain
+                if best.score - h.score < close
             ]
         return tuple(found)

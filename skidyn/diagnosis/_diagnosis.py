@@ -375,11 +375,11 @@ def _limits(
     counts = problem.rows.counts
     fit = result.fit
     inflation = variance_inflation(problem, fit.residual, range(problem.n_joints))
-    _, n_blocks = time_blocks(problem, block_length(problem, float(inflation.max())))
+    block, _ = time_blocks(problem, block_length(problem, float(inflation.max())))
     gain = sum((h.gain for h in result.findings), np.zeros(problem.n_joints))
     share = np.expm1(np.maximum(np.asarray(gain, dtype=float), 0.0) / np.maximum(counts, 1))
     earlier = np.asarray(counts * share, dtype=np.float64)
-    gates = Gates(settings, result.n_tests, n_blocks - 1, counts, _whiteness(problem, fit), earlier)
+    gates = Gates(settings, result.n_tests, block, counts, _whiteness(problem, fit), earlier)
     return find_limits(problem, result.candidates, blocks, fit.noise, inflation, gates)
 
 

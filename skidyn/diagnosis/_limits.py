@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, t as student
+from scipy.stats import norm
 
 from skidyn._signals import Array
 from skidyn._text import inside
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.diagnosis._rule import Settings
+from skidyn.diagnosis._rule import Settings, degrees_of_freedom, least_significant
 from skidyn.effects import get_effect, searched_kinds
 from skidyn.evidence import (
     Felt,
@@ -85,8 +85,8 @@ class Gates:
         Thresholds of the search.
     n_tests : int
         Candidates tried.
-    free : int
-        Number of blocks of time of the test minus one.
+    block : list of ndarray of shape (n_rows_j,)
+        Block of time of the test in which every row lies, by joint.
     counts : ndarray of shape (n_joints,)
         Averaged rows.
     whiteness : ndarray of shape (n_joints,)
@@ -98,12 +98,20 @@ class Gates:
 
     settings: Settings
     n_tests: int
-    free: int
+    block: list[NDArray[np.int64]]
     counts: NDArray[np.int64]
     whiteness: Array
     earlier: Array
 
-    def needed(self, joint: int, n_parameters: int, inflation: float) -> float:
+    def acting(self, joint: int, column: Array) -> float:
+        """Degrees of freedom of the blocks in which a column acts on a joint."""
+        size = float(np.abs(column).max(initial=0.0))
+        if not 0 < size < np.inf:
+            return 1.0  # nothing of it is new to the model, but for rounding
+        share = np.bincount(self.block[joint], (column / size) ** 2)
+        return degrees_of_freedom(share[:, None, None] / share.sum())
+
+    def needed(self, joint: int, n_parameters: int, inflation: float, free: float) -> float:
         """Size of a column relative to the noise with which the effect is found.
 
         Parameters
@@ -114,11 +122,12 @@ class Gates:
             Coefficients and shape parameters of the effect.
         inflation : float
             Variance inflation of the residual.
+        free : float
+            Degrees of freedom of the blocks in which the effect acts.
         """
         s = self.settings
-        chance = s.level / self.n_tests / 2
         drop = max(
-            inflation * float(student.isf(chance, max(self.free, 2))) ** 2,
+            inflation * least_significant(s.level / self.n_tests, free) ** 2,
             s.least_gain + 2 * inflation * n_parameters,
             float(s.least_share * self.counts[joint]),
             float(s.least_drop * self.whiteness[joint] * self.counts[joint]),
@@ -154,7 +163,11 @@ def find_limits(
     gram = gram_of(felt, width)
     model = Normal(gram, np.zeros(len(gram)), column_sizes(gram))
     power = [float(np.sum(t**2)) / s**2 for t, s in zip(problem.target, sigma, strict=True)]
-    needed = cache(lambda joint, count: gates.needed(joint, count, float(inflation[joint])))
+
+    @cache
+    def needed(joint: int, count: int, free: int) -> float:
+        return gates.needed(joint, count, float(inflation[joint]), free)
+
     largest: dict[tuple[str, int], list[tuple[Candidate, float]]] = {}
     for candidate in candidates:
         effect = candidate.term.effect
@@ -162,8 +175,9 @@ def find_limits(
         if len(candidate.joints) != 1 or effect.nameless or share:
             continue
         joint = candidate.joints[0]
-        own, swept = _information(candidate, felt, width, sigma, model)
-        least = needed(joint, candidate.width + candidate.n_shapes)
+        own, swept, column = _information(candidate, felt, width, sigma, model)
+        free = max(1, round(gates.acting(joint, column)))
+        least = needed(joint, candidate.width + candidate.n_shapes, free)
         size = least / np.sqrt(swept) if swept > NEW_SHARE * own else np.inf
         # A size larger than the whole torque is not a limit, nor a torque beyond its range, of
         # which the motion contains a negligible part.
@@ -212,17 +226,24 @@ def _hidden_shapes(tried: Sequence[tuple[Candidate, float]]) -> list[float]:
 
 def _information(
     candidate: Candidate, felt: Sequence[Felt], width: int, sigma: Array, model: Normal
-) -> tuple[float, float]:
-    """Squared size of the first column before and after elimination of the other columns."""
+) -> tuple[float, float, Array]:
+    """Squared size of the first column before and after elimination of the other columns.
+
+    Also what is left of it on the rows of its joint.
+    """
+    (joint,) = candidate.joints
     z = {j: block / sigma[j] for j, block in candidate.rows.items()}
     cross = products_with(felt, z, width)
     own = np.asarray(sum(block.T @ block for block in z.values()))
-    swept = own - cross.T @ model.solve(cross)
+    mimic = model.solve(cross)
+    swept = own - cross.T @ mimic
+    rows = z[joint] - felt[joint].rows @ mimic[felt[joint].places]
     if len(own) == 1:
-        return float(own[0, 0]), float(max(swept[0, 0], 0.0))
+        return float(own[0, 0]), float(max(swept[0, 0], 0.0)), rows[:, 0]
     others = swept[1:, 1:] + 1e-9 * np.diag(np.diag(own)[1:] + 1e-300)
-    rest = swept[0, 0] - swept[0, 1:] @ np.linalg.solve(others, swept[1:, 0])
-    return float(own[0, 0]), float(max(rest, 0.0))
+    along = np.linalg.solve(others, swept[1:, 0])
+    rest = float(max(swept[0, 0] - swept[0, 1:] @ along, 0.0))
+    return float(own[0, 0]), rest, rows[:, 0] - rows[:, 1:] @ along
 
 
 def without_withdrawn(limits: Sequence[Limit], withdrawn: Sequence[Candidate]) -> list[Limit]:

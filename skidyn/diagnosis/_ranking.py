@@ -29,6 +29,7 @@ from skidyn.diagnosis._parts import part_candidates
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recordings import DRIFT, FRICTION, choose, drifting, own_friction
 from skidyn.diagnosis._rule import (
+    ALL_LEFT,
     MASKED,
     RESOLVED,
     ROUNDS,
@@ -44,8 +45,8 @@ from skidyn.effects import get_effect
 Mask = NDArray[np.bool_]
 #: Indices in the pool of the added candidates, and the reduction of the held-out error.
 _Greedy = tuple[list[int], float]
-#: Number of kinds of which other forms are tried, and the share of the best score from which the
-#: second is always tried.
+#: Number of kinds of which other forms are tried, and the share of the best score from which
+#: another kind or another pair of joints is nearly as good.
 FORMS_TRIED, NEARLY = 3, 0.9
 
 
@@ -301,7 +302,22 @@ class RankingSearch(SearchState):
         kinds = [kind for kind in self.kinds if kind not in already]
         found = span_candidates(self.problem, kinds, tester, self.significant, least)
         found = [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
-        return [self._in_time(own) for own in found]
+        return [self._in_time(own) for own in found if not self._follows_one_joint(tester, own)]
+
+    def _follows_one_joint(self, tester: Tester, own: Sequence[Candidate]) -> bool:
+        """Whether a load in intervals of many recordings explains the torque of one joint only.
+
+        A force whose torque on several joints has the right ratios is a force; one that explains a
+        single joint has enough coefficients to follow whatever is missing there.
+        """
+        timed = {name for c in own for name, *_ in c.term.spans}
+        several = any(len(c.rows) > 1 for c in own)
+        if not several or len(timed) <= self.settings.most_recordings:
+            return False
+        left = tester.beside([c.rows for c in own]).residual
+        pairs = zip(tester.residual, left, strict=True)
+        removed = np.array([float(before @ before - after @ after) for before, after in pairs])
+        return bool(removed.max() > ALL_LEFT * np.maximum(removed, 0.0).sum())
 
     def _in_time(self, own: list[Candidate]) -> list[Candidate]:
         """An offset or friction in intervals of many recordings as an unknown function of time.

@@ -49,6 +49,7 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
+from scipy.stats import t as student
 
 from skidyn._signals import Array
 from skidyn.evidence import RIDGE, Felt, Problem, column_sizes, felt_columns, gram_of, products_with
@@ -79,7 +80,8 @@ MASKED, SURE, ROUNDS = 0.3, 1e-9, 3
 #: acts on a single joint takes back all of it.
 TAKEN_BACK = 0.5
 #: Share of what is left on several joints that an effect must remove not to be an error of earlier,
-#: imperfect formulas, though the rest is not white (``_acceptance.py``).
+#: imperfect formulas, though the rest is not white (``_acceptance.py``); and share of what a load
+#: in intervals removes above which it acts on a single joint (``_ranking.py``).
 ALL_LEFT = 0.9
 #: Of explanations that the data cannot separate, one is preferred with which the torque of the
 #: identified bodies differs from that of the described ones by less than this share of the others.
@@ -572,8 +574,8 @@ class Tester:
         mean = max(sum(float(r @ r) for r in left) / self._free, 1e-300)
         chance = _tail(drop / k / factor / mean, k, max(2.0, self._free / factor))
         if significant(chance):  # blocks can only raise it
-            longest = max(map(inflation, rows))
-            by_blocks = self._by_blocks(new, left, score, factor * mean, longest)
+            largest = max(map(inflation, rows))
+            by_blocks = self._by_blocks(new, left, score, factor * mean, largest)
             chance = max(chance, by_blocks)
         coefficients = np.zeros(len(told))
         coefficients[told] = b / size
@@ -633,6 +635,8 @@ class Tester:
         longest = self._duration / (2 * len(score) + ENOUGH_BLOCKS)
         length = min(block_length(self.problem, inflation), longest)
         block, count = time_blocks(self.problem, length)
+        if count < len(score) + FEWEST_BLOCKS:
+            return 1.0
         index = np.concatenate(block)
         order = np.argsort(index, kind="stable")
         edges = np.searchsorted(index[order], np.arange(count + 1)).tolist()
@@ -642,12 +646,12 @@ class Tester:
         grams = np.array([columns[rows].T @ columns[rows] for rows in parts])
         score, sums, share = unbiased_scores(score, sums, grams)
         k, free = len(score), degrees_of_freedom(share)
-        if count < k + FEWEST_BLOCKS:
-            return 1.0
         own = sums.T @ sums
         many = _hotelling(score, own, free)
+        # The moderated variance is mostly a known matrix times a size. The law is then F, without
+        # the degrees of freedom that Hotelling's takes for the estimated covariances.
         both = free * own + LIKE_ELSEWHERE * stationary * np.eye(k)
-        free += LIKE_ELSEWHERE  # of a size mostly, so that the number of coefficients takes none
+        free += LIKE_ELSEWHERE
         few = _tail(float(score @ np.linalg.solve(both, score)) * free / k, k, free)
         return min(1.0, many / (1.0 - IN_FEW_BLOCKS), few / IN_FEW_BLOCKS)
 
@@ -688,17 +692,43 @@ def _hotelling(score: Array, variance: Array, free: float) -> float:
 def degrees_of_freedom(share: Array) -> float:
     """Degrees of freedom of the variance from blocks with some shares of the information.
 
-    Twice the squared expectation over the variance of the sum of :func:`unbiased_scores`, for
-    independent rows.
+    Twice the squared expectation of the sum of squares of :func:`unbiased_scores` over its
+    variance, for independent rows. Several coefficients have one number: that for their mean share.
 
     Parameters
     ----------
     share : ndarray of shape (n_blocks, n_coefficients, n_coefficients)
         Of every block, for orthonormal columns.
+
+    Returns
+    -------
+    float
+        The number of blocks less one if all have equal shares, fewer if some have more.
     """
     h = np.trace(share, axis1=1, axis2=2) / share.shape[1]
-    between = h**2 / np.maximum(1.0 - h, RIDGE)
-    return float(1.0 / (h @ h + between.sum() ** 2 - between @ between))
+    between = np.sort(h**2 / np.maximum(1.0 - h, RIDGE))
+    # Products of different blocks, smallest first: one block may hold nearly everything.
+    pairs = 2.0 * float(between[1:] @ np.cumsum(between)[:-1])
+    return 1.0 / (float(h @ h) + pairs)
+
+
+def least_significant(level: float, free: float) -> float:
+    """Size of one coefficient, in standard errors, from which blocks find it significant.
+
+    Parameters
+    ----------
+    level : float
+        Largest p-value.
+    free : float
+        Degrees of freedom of the blocks in which it acts.
+
+    Returns
+    -------
+    float
+    """
+    many = student.isf((1.0 - IN_FEW_BLOCKS) * level / 2, free)
+    few = student.isf(IN_FEW_BLOCKS * level / 2, free + LIKE_ELSEWHERE)
+    return float(min(many, few))
 
 
 def unbiased_scores(score: Array, sums: Array, grams: Array) -> tuple[Array, Array, Array]:

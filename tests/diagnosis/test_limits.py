@@ -92,3 +92,22 @@ def test_motion_at_one_speed_cannot_tell_the_shape_of_friction():
     (limit,) = [x for x in diagnosis.limits if (x.kind, x.joint) == ("stribeck", 2)]
     assert limit.largest_hidden is None
     assert "constant-speed sweeps" in limit.sentence
+
+
+def test_a_joint_that_moves_once_has_limits_of_its_few_blocks(complete_log):
+    X, robot = complete_log.X.copy(), complete_log.robot
+    run = X["trajectory"] == X["trajectory"].iloc[0]
+    time = (X["time"] - X["time"].iloc[0]).to_numpy()
+    moves = run.to_numpy() & (time > 1.0) & (time < 4.0)
+    phase, rate = np.where(moves, time - 1.0, 0.0), 2 * np.pi / 3.0
+    X["q2"] = 0.3 + 0.4 * (1.0 - np.cos(rate * phase))
+    X["dq2"] = 0.4 * rate * np.sin(rate * phase)
+    X["ddq2"] = np.where(moves, 0.4 * rate**2 * np.cos(rate * phase), 0.0)
+    motion = [X[[f"{s}{j}" for j in (1, 2)]].to_numpy() for s in ("q", "dq", "ddq")]
+    y = robot.inverse_dynamics(*motion) + 0.3 * np.sign(motion[1]) + 0.5 * motion[1]
+    y += np.random.default_rng(0).normal(0.0, 0.02, y.shape)
+
+    diagnosis = diagnose(RBDRegressor(robot, ("viscous", "coulomb")), X, y, checks=())
+
+    limits = [x.largest_hidden for x in diagnosis.limits if x.largest_hidden is not None]
+    assert limits and np.isfinite(limits).all()
