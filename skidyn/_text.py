@@ -125,7 +125,7 @@ def interval_told(value: float, low: float, high: float) -> str:
 
 
 def measure(name: str, value: object, unit: str = "") -> str:
-    """A parameter with half its interval, if that is known; the unit ``"1"`` means none.
+    """A parameter with its interval, if that is known; the unit ``"1"`` means none.
 
     >>> measure("k", (3.5, 3.1, 3.9), "N m/rad^2"), measure("n", 3)
     ('k = 3.50 ± 0.40 N m/rad²', 'n = 3')

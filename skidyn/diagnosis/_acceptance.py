@@ -20,8 +20,8 @@ from skidyn.diagnosis._hypothesis import (
     simplicity_of,
     within_recordings,
 )
-from skidyn.diagnosis._ranking import NEARLY, RankingSearch
-from skidyn.diagnosis._rule import ALL_LEFT, NEARER, TAKEN_BACK
+from skidyn.diagnosis._ranking import RankingSearch
+from skidyn.diagnosis._rule import ALL_LEFT, NEARER, NEARLY, TAKEN_BACK
 from skidyn.effects import NamelessEffect, get_effect
 from skidyn.evidence import weighted_least_squares
 

@@ -85,10 +85,12 @@ def parameter_intervals(
                     whole[own] + coefficients[own] - full[own], problem.signals
                 )
             )
-        not_zero = _half_width(held[:, own]) < np.abs(whole[own])
-        sure = {c.name for c, sure in zip(term.coefficients, not_zero, strict=True) if sure}
+        apart = _half_width(held[:, own]) < np.abs(whole[own])
+        not_zero = {
+            c.name for c, is_apart in zip(term.coefficients, apart, strict=True) if is_apart
+        }
         result[term] = {
-            name: _interval(number, [r[name] for r in replicates if name in r], name in sure)
+            name: _interval(number, [r[name] for r in replicates if name in r], name in not_zero)
             for name, number in value.items()
         }
     return result

@@ -104,7 +104,15 @@ class Gates:
     earlier: Array
 
     def acting(self, joint: int, column: Array) -> float:
-        """Degrees of freedom of the blocks in which a column acts on a joint."""
+        """Degrees of freedom of the blocks in which a column acts on a joint.
+
+        Parameters
+        ----------
+        joint : int
+            Joint, from 0.
+        column : ndarray of shape (n_rows_j,)
+            What the model cannot represent of the column of an effect.
+        """
         size = float(np.abs(column).max(initial=0.0))
         if not 0 < size < np.inf:
             return 1.0  # nothing of it is new to the model, but for rounding

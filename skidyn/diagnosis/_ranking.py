@@ -31,6 +31,7 @@ from skidyn.diagnosis._recordings import DRIFT, FRICTION, choose, drifting, own_
 from skidyn.diagnosis._rule import (
     ALL_LEFT,
     MASKED,
+    NEARLY,
     RESOLVED,
     ROUNDS,
     Tester,
@@ -45,9 +46,8 @@ from skidyn.effects import get_effect
 Mask = NDArray[np.bool_]
 #: Indices in the pool of the added candidates, and the reduction of the held-out error.
 _Greedy = tuple[list[int], float]
-#: Number of kinds of which other forms are tried, and the share of the best score from which
-#: another kind or another pair of joints is nearly as good.
-FORMS_TRIED, NEARLY = 3, 0.9
+#: Number of kinds of which other forms are tried.
+FORMS_TRIED = 3
 
 
 class RankingSearch(SearchState):

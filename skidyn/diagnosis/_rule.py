@@ -86,6 +86,9 @@ ALL_LEFT = 0.9
 #: Of explanations that the data cannot separate, one is preferred with which the torque of the
 #: identified bodies differs from that of the described ones by less than this share of the others.
 NEARER = 0.5
+#: Share of the best score from which other forms of another kind are tried, and another pair of
+#: joints of a coupling is told with the best one (``_ranking.py``, ``_acceptance.py``).
+NEARLY = 0.9
 #: Share of a recording within which a change at its beginning or end lies between two recordings.
 BETWEEN = 0.02
 #: Share of an effect in one fold above which the others do not determine it: then parts of

@@ -336,7 +336,7 @@ def sure(finding: Finding) -> str:
 
 
 def sizes(finding: Finding) -> str:
-    """The parameters of a finding with half their intervals, ``"k = 3.50 ± 0.40 N m/rad"``."""
+    """The parameters of a finding with their intervals, ``"k = 3.50 ± 0.40 N m/rad"``."""
     return ", ".join(_parameters(finding)[0][: _told(finding)])
 
 

@@ -171,8 +171,7 @@ class FunctionOfPositionAndVelocity(_Spline):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         low, high = shape["low"], shape["high"]
-        inside = (2 * signals.q[:, joint] - low - high) / (high - low)
-        orders = continued(lambda t: np.asarray(legvander(t, 2)), inside, -1.0, 1.0)
+        orders = _ordered_functions(signals.q[:, joint], None, low, high)[:, :3]
         dq = signals.dq[:, joint]
         motion = (dq, signals.sign[:, joint], np.abs(dq))
         return np.hstack([orders * m[:, None] for m in motion])
@@ -412,14 +411,12 @@ class FunctionOfTwoSignals(FunctionOfSignals):
     n_signals = 2
 
 
-class LowOrderOfTwoSignals(FunctionOfSignals):
+class LowOrderOfTwoSignals(FunctionOfTwoSignals):
     """A function of two signals of any joints in low orders, which a short log determines."""
 
     kind = "low_order_of_two_signals"
     title = "Function of two signals in low orders"
-    formula = r"f(s_1, s_2)"
     coefficients = unnamed_coefficients(10)
-    n_signals = 2
 
 
 class FunctionOfThreeSignals(FunctionOfSignals):
@@ -572,7 +569,10 @@ class ClockPeriodic(NamelessEffect):
     highest: ClassVar[float] = 8.0
 
     def carriers(self, signals: Signals, joint: int) -> list[Array]:
-        """What the waves are multiplied by, each of shape (n_samples,)."""
+        """What the waves are multiplied by, each of shape (n_samples,).
+
+        The line is searched in the residual times the last one.
+        """
         return [np.ones(signals.n_samples)]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:

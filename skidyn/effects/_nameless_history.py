@@ -168,10 +168,18 @@ class FunctionOfLastReversal(_OfAnyJoint):
     coefficients = unnamed_coefficients(_TURNING)
     softness = 2e-3
 
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        found = []
+        for shape in super().grid(signals, joints):
+            low, high = supported_range(signals, signals.q[:, shape["other"]])
+            if high > low:
+                found.append({**shape, "low": low, "high": high})
+        return found
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         k = int(shape["other"])
         turned = signals.once(("last reversal", k), lambda: _last_reversal(signals, k))
-        return splines(turned, *supported_range(signals, signals.q[:, k]), _TURNING)
+        return splines(turned, shape["low"], shape["high"], _TURNING)
 
 
 class FrictionAfterMotion(_OfAnyJoint):

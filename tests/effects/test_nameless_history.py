@@ -56,9 +56,13 @@ def test_an_offset_that_sets_in_stays_and_is_called_by_its_moment(signals):
 def test_what_remembers_a_reversal_keeps_its_torque_until_the_next_one(signals):
     fading = signals.with_(q=signals.q * np.exp(-0.2 * signals.time)[:, None])
     effect = get_effect("function_of_last_reversal")
-    assert effect.grid(fading, (0,)) == [{"other": 0}, {"other": 1}]
+    shapes = effect.grid(fading, (0,))
+    assert [shape["other"] for shape in shapes] == [0, 1]
     assert effect.variables(0, {"other": 1}) == ("q2", "dq2")
-    columns = effect.columns(fading, 0, other=1)
+    columns = effect.columns(fading, 0, **shapes[1])
+    # the function is the same on other motion
+    half = effect.columns(fading.take(slice(0, 150)), 0, **shapes[1])
+    np.testing.assert_allclose(half, columns[:150])
     direction = np.sign(np.diff(fading.q[:, 1]))
     same = (direction[1:] == direction[:-1]) & (np.diff(fading.trajectory)[1:] == 0)
     changed = np.abs(columns[2:] - columns[1:-1]).max(axis=1) > 1e-9
