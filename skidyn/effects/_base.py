@@ -38,6 +38,9 @@ class Coefficient:
     is_zero : bool
         Whether it only defines the zero of the effect, as the constant of a spring: a finding must
         be significant without it.
+    limit_kind : str
+        Simpler kind that is equivalent to the effect if no other coefficient is significant, as
+        friction that differs by a constant between the directions is an offset.
 
     Examples
     --------
@@ -51,6 +54,7 @@ class Coefficient:
     limit: float = np.inf
     is_share: bool = False
     is_zero: bool = False
+    limit_kind: str = ""
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,10 @@ class AsymmetricFriction(Effect):
     drawn_against = "dq"
     title = "Direction-dependent friction"
     formula = r"\Delta F_v\,|\dot q|^p + \Delta F_c"
-    coefficients = (Coefficient("dFv", "N m s/rad"), Coefficient("dFc", "N m"))
+    coefficients = (
+        Coefficient("dFv", "N m s/rad"),
+        Coefficient("dFc", "N m", limit_kind="offset"),
+    )
     shapes = (
         Shape("power", "1", (), 0.3, 3.0, scales=False),
         Shape("saturating", "rad/s", (), *SATURATING),

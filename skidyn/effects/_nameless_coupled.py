@@ -62,6 +62,32 @@ class Crosstalk(NamelessEffect):
         return signals.model_torque[:, [int(shape["other"])]]
 
 
+class FunctionOfOtherTorque(NamelessEffect):
+    """A torque that depends on that of another joint: a bent gauge, a supply that both share."""
+
+    kind = "function_of_other_torque"
+    drawn_against = "load"
+    title = "Function of another joint's torque"
+    formula = r"f(\tau_k)"
+    coefficients = unnamed_coefficients(3)
+    needs = ("model_torque",)
+    is_of_one_number = True
+
+    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
+        return (f"tau{int(shape['other']) + 1}",)
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        if signals.model_torque is None:
+            return []
+        size = np.sqrt(np.mean(signals.model_torque**2, axis=0))
+        return [s | {"size": float(size[s["other"]])} for s in self.others(signals, joints[0])]
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        assert signals.model_torque is not None
+        torque = signals.model_torque[:, int(shape["other"])] / max(shape["size"], 1e-300)
+        return np.column_stack([torque, np.abs(torque), torque * np.abs(torque)])
+
+
 class GyroscopicCouple(NamelessEffect):
     """A torque of one joint due to the speed of another, and its reaction, by a spinning mass [1]_.
 
@@ -134,6 +160,7 @@ class SwingingLoad(NamelessEffect):
 COUPLED: tuple[type[NamelessEffect], ...] = (
     FrictionOverOtherLoad,
     Crosstalk,
+    FunctionOfOtherTorque,
     GyroscopicCouple,
     SwingingLoad,
 )

@@ -60,6 +60,28 @@ class FunctionOfTimeSinceStart(NamelessEffect):
         return np.column_stack([*fading, share, np.ones_like(share)])
 
 
+class OscillationSinceStart(NamelessEffect):
+    """An oscillation that fades from the start of every recording, as of a hook or a table."""
+
+    kind = "oscillation_since_start"
+    drawn_against = "time"
+    title = "Oscillation that fades from the start of every recording"
+    formula = r"e^{-t/T}\,(c_1\cos 2\pi f t + c_2\sin 2\pi f t)"
+    coefficients = unnamed_coefficients(2)
+    shapes = (
+        Shape("frequency", "Hz", (0.4, 0.6, 0.9, 1.35, 2.0, 3.0), 0.1, 20.0, scales=False),
+        Shape("decay", "s", (0.5, 2.0), 0.1, 30.0, scales=False),
+    )
+    depends_on = ("time",)
+    needs = ("time",)
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        since = _since_start(signals)
+        phase = 2 * np.pi * shape["frequency"] * since
+        fading = np.exp(-since / shape["decay"])
+        return np.column_stack([fading * np.cos(phase), fading * np.sin(phase)])
+
+
 class FunctionOfTime(NamelessEffect):
     """A torque that drifts slowly over the whole log, as the zero of a sensor does."""
 
@@ -372,6 +394,7 @@ HISTORY: tuple[type[NamelessEffect], ...] = (
     FunctionOfTime,
     SuddenOffset,
     FunctionOfTimeSinceStart,
+    OscillationSinceStart,
     FrictionSinceReversal,
     FunctionOfWaySinceReversal,
     FunctionOfLastReversal,

@@ -25,7 +25,7 @@ def stiffens(distance: Array, scale: float) -> bool:
     of a number, the largest force exceeds that of most rows so far that they no longer count, and
     the force soon overflows.
     """
-    return bool(np.abs(distance).max() < -np.log(np.finfo(float).eps) * scale)
+    return bool(np.abs(distance).max(initial=0.0) < -np.log(np.finfo(float).eps) * scale)
 
 
 class Offset(Effect):
@@ -205,11 +205,12 @@ class EndStop(Effect):
     """One-sided elastic contact beyond a position: bumper, hose, cable pulled tight.
 
     A soft bumper stiffens: then the torque grows with another ``power`` of the deflection (1 if the
-    shape has none), in units of 1 rad or 1 m, so that the unit of the stiffness is the same. A
-    contact that loses energy has a larger torque during approach, by the factor ``1 + damping``
-    times the speed of the approach (Hunt, Crossley 1975, J. Applied Mechanics 42(2)), and never
-    pulls. With ``q_low`` in the shape there is a contact at either end, the second below that
-    position and as stiff as the first.
+    shape has none), in units of 1 rad or 1 m, so that the unit of the stiffness is the same; or,
+    with ``stiffening``, in rad or m, with the exponential function of the deflection divided by
+    this length, minus 1 and times it, as foam does. A contact that loses energy has a larger torque
+    during approach, by the factor ``1 + damping`` times the speed of the approach (Hunt, Crossley
+    1975, J. Applied Mechanics 42(2)), and never pulls. With ``q_low`` in the shape there is a
+    contact at either end, the second below that position and as stiff as the first.
     """
 
     kind = "end_stop"
@@ -224,9 +225,11 @@ class EndStop(Effect):
         Shape("q_low", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("damping", "s/rad", (), 1e-3, 1e3, scales=False, has_interval=False),
         Shape("power", "1", (), 0.7, 2.2, scales=False, has_interval=False),
+        Shape("stiffening", "rad", (), 0.01, 2.0, has_interval=False),
     )
     forms = (
         {"power": 2.0},
+        {"stiffening": 0.4},  # of the deflection
         {"power": 1.0, "damping": 0.5},
         {"power": 1.5, "damping": 0.5},
         {"q_low": 0.0},
@@ -244,7 +247,7 @@ class EndStop(Effect):
             for share in (0.80, 0.84, 0.88, 0.92, 0.95)
             for side in (1.0, -1.0)
         ]
-        stiffening, *damped, _, both_damped = map(dict, self.forms)
+        stronger, foam, *damped, _, both_damped = map(dict, self.forms)
         some = [stops[k] for k in (2, 3, 6, 7)]
         softer = [
             stop | form | {"damping": form["damping"] / unit} for form in damped for stop in some
@@ -256,11 +259,18 @@ class EndStop(Effect):
         ]
         slowing = {"damping": both_damped["damping"] / unit}
         both += [ends | slowing for ends in both]
-        return [*stops, *(stop | stiffening for stop in stops), *softer, *both]
+        stiffer = [stop | stronger for stop in stops]
+        for stop in some:
+            depth = float((stop["side"] * (q - stop["q_lim"])).max())
+            stiffer.append(stop | {"stiffening": foam["stiffening"] * depth})
+        return [*stops, *stiffer, *softer, *both]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         q = signals.q[:, joints[0]]
-        beyond = float(np.mean(shape["side"] * (q - shape["q_lim"]) > 0))
+        depth = shape["side"] * (q - shape["q_lim"])
+        beyond = float(np.mean(depth > 0))
+        if not stiffens(depth[depth > 0], shape.get("stiffening", np.inf)):
+            return False
         if "q_low" not in shape:
             return FEWEST_TOUCHING < beyond < MOST_TOUCHING
         below = float(np.mean(q < shape["q_low"]))
@@ -269,11 +279,13 @@ class EndStop(Effect):
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         q, dq = signals.q[:, joint], signals.dq[:, joint]
         power, damping = shape.get("power", 1.0), shape.get("damping", 0.0)
+        scale = shape.get("stiffening")
         torque = np.zeros_like(q)
         ends = [(shape["side"], shape["q_lim"])]
         if "q_low" in shape:
             ends.append((-1.0, shape["q_low"]))
         for side, limit in ends:
-            push = side * np.maximum(0.0, side * (q - limit)) ** power
+            push = np.maximum(0.0, side * (q - limit))
+            push = side * (push**power if scale is None else scale * (np.exp(push / scale) - 1.0))
             torque += push * np.maximum(0.0, 1.0 + damping * side * dq) if damping else push
         return torque[:, None]

@@ -21,6 +21,8 @@ _BITTENCOURT = "Bittencourt, Wernholt, Sander-Tavallaey, Brogardh (2010), IROS, 
 _CHANGES = 16
 #: Share of the recording before the last one in which a change that lasts is to be seen.
 _SHOWN = 0.02
+#: Ratio of the two time constants of a warm-up.
+FASTER = 4.0
 #: Temperature ranges over which the dependence on temperature levels off, K.
 _LEVELLING = ({"levels_over": 6.0}, {"levels_over": 15.0})
 
@@ -49,6 +51,11 @@ def _constant_temperature(signals: Signals, joint: int) -> str | None:
     if signals.temperature is not None and np.ptp(signals.temperature[:, joint]) < 0.5:
         return f"the temperature of joint {joint + 1} changes by less than 0.5 degrees"
     return None
+
+
+def _risen(times: Array) -> Array:
+    """Share of a warm-up after some time constants; before its start it goes on as it began."""
+    return np.where(times > 0, -np.expm1(-np.maximum(times, 0.0)), times)
 
 
 class TemperatureFriction(Effect):
@@ -115,11 +122,11 @@ class TemperatureOffset(Effect):
 class FrictionDrift(Effect):
     """Friction that changes slowly over the log if no temperature is logged.
 
-    A gear warms up quickly at first and then ever more slowly: friction is a parabola of a warm-up
-    that approaches its end with a time constant. The first two coefficients are the change from the
-    start of the log to its end. They are the only ones for friction that changed at once, as after
-    a repair or when a seal slips; its shape contains the time ``since`` which it has changed, or
-    ``level`` if it has another level in some recordings.
+    A gear warms up quickly at first and then ever more slowly, its inside before its housing: a
+    warm-up approaches its end with a time constant, another one four times as fast. The first two
+    coefficients are the change from the start of the log to its end. They are the only ones for
+    friction that changed at once, as after a repair or when a seal slips; its shape contains the
+    time ``since`` which it has changed, or ``level`` if it has another level in some recordings.
     """
 
     kind = "friction_drift"
@@ -127,8 +134,9 @@ class FrictionDrift(Effect):
     title = "Friction drift"
     formula = (
         r"(a\,\dot q + b\,\mathrm{sign}\,\dot q)\,x"
-        r" + (c\,\dot q + d\,\mathrm{sign}\,\dot q)\,x\,(1-x),"
-        r"\quad x = \frac{1-e^{-(t-t_0)/T}}{1-e^{-s/T}}"
+        r" + (c\,\dot q + d\,\mathrm{sign}\,\dot q)\,(y-x),"
+        r"\quad x = \frac{1-e^{-(t-t_0)/T}}{1-e^{-s/T}},"
+        r"\ y = \frac{1-e^{-4(t-t_0)/T}}{1-e^{-4s/T}}"
     )
     coefficients = (
         Coefficient("dFv", "N m s/rad"),
@@ -180,13 +188,9 @@ class FrictionDrift(Effect):
         if "since" in shape:
             later = (signals.clock >= shape["since"]).astype(float)
             return np.column_stack([later * dq, later * sign])
-        since, time_constant = signals.clock - shape["t0"], shape["time_constant"]
-        # Before the log began, it has the value of its start.
-        risen = np.where(
-            since > 0, -np.expm1(-since.clip(0) / time_constant), since / time_constant
-        )
-        x = risen / -np.expm1(-shape["span"] / time_constant)
-        bent = x * (1 - x)
+        since, span, slow = signals.clock - shape["t0"], shape["span"], shape["time_constant"]
+        x, y = (_risen(since / t) / _risen(span / t) for t in (slow, slow / FASTER))
+        bent = y - x
         return np.column_stack([x * dq, x * sign, bent * dq, bent * sign])
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:

@@ -23,6 +23,20 @@ def test_crosstalk_is_the_torque_of_the_other_joint(signals):
     )
 
 
+def test_a_function_of_the_torque_of_another_joint_has_its_unit(signals):
+    effect = get_effect("function_of_other_torque")
+    (shape,) = effect.grid(signals, (0,))
+    assert effect.variables(0, shape) == ("tau2",)
+    torque = signals.model_torque[:, 1]
+    bent = 0.3 * torque * np.abs(torque)
+    columns = effect.columns(signals, 0, **shape)
+    left = bent - columns @ np.linalg.lstsq(columns, bent, rcond=None)[0]
+    np.testing.assert_allclose(left, 0.0, atol=1e-9 * np.abs(bent).max())
+    twice = signals.with_(model_torque=2 * signals.model_torque)
+    (own,) = effect.grid(twice, (0,))
+    np.testing.assert_allclose(effect.columns(twice, 0, **own), columns)
+
+
 def test_friction_over_the_load_of_another_joint_names_both(signals):
     effect = get_effect("friction_over_other_load")
     (shape,) = effect.grid(signals, (0,))

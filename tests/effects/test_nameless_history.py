@@ -43,6 +43,16 @@ def test_a_drift_over_the_log_needs_several_recordings_and_stays_beyond_it(signa
     assert np.all(later[signals.clock > shape["low"] + 1.0] == later[-1])
 
 
+def test_an_oscillation_since_the_start_begins_anew_in_every_recording(signals):
+    effect = get_effect("oscillation_since_start")
+    columns = effect.columns(signals, 0, frequency=1.5, decay=0.8)
+    assert effect.variables(0, {}) == ("time",)
+    for rows in signals.segments:
+        since = signals.clock[rows] - signals.clock[rows][0]
+        swing = np.exp(-since / 0.8) * np.exp(2j * np.pi * 1.5 * since)
+        np.testing.assert_allclose(columns[rows], np.column_stack([swing.real, swing.imag]))
+
+
 def test_an_offset_that_sets_in_stays_and_is_called_by_its_moment(signals):
     effect = get_effect("sudden_offset")
     grid = effect.grid(signals, (0,))

@@ -30,6 +30,21 @@ def test_a_bumper_that_stiffens(signals, columns_of):
     np.testing.assert_allclose(low, -(np.minimum(0, q + 0.4) ** 2))
 
 
+def test_a_stop_of_foam_stiffens_exponentially(signals, columns_of):
+    q = signals.q[:, 0]
+    foam = columns_of("end_stop", signals, q_lim=0.4, side=1.0, stiffening=0.2)[:, 0]
+    np.testing.assert_allclose(foam, 0.2 * np.expm1(np.maximum(0, q - 0.4) / 0.2))
+
+
+def test_a_stop_is_not_tried_with_a_stiffness_that_would_overflow():
+    turns = np.linspace(-200.0, 200.0, 50)[:, None]
+    signals = Signals(turns, 0 * turns, 0 * turns, trajectory=np.zeros(50))
+    effect = get_effect("end_stop")
+    stop = {"q_lim": 120.0, "side": 1.0}
+    assert effect.admissible(signals, (0,), stop | {"stiffening": 30.0})
+    assert not effect.admissible(signals, (0,), stop | {"stiffening": 0.01})
+
+
 def test_a_bumper_that_loses_energy_resists_the_way_in_and_never_pulls(signals, columns_of):
     q, dq = signals.q[:, 0], signals.dq[:, 0]
     lossy = columns_of("end_stop", signals, q_lim=0.3, side=1.0, damping=3.0)[:, 0]

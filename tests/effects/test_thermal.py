@@ -40,6 +40,22 @@ def test_friction_of_another_level_has_no_moment(signals):
     assert "3 s" in effect.meaning({"since": {"value": 3.0, "unit": "s"}})
 
 
+def test_an_inside_that_warms_before_its_housing_is_one_drift(signals):
+    clock = signals.clock
+    share = (clock - clock.min()) / np.ptp(clock)
+    warm = 0.6 * np.exp(-share / 0.08) + 0.4 * np.exp(-share / 0.6)
+    torque = warm * signals.sign[:, 0]
+    effect = get_effect("friction_drift")
+    shapes = [s for s in effect.grid(signals, (0,)) if "since" not in s]
+    shapes += [s | {"time_constant": 0.45 * np.ptp(clock)} for s in shapes]
+    left = []
+    for shape in shapes:
+        columns = effect.columns(signals, 0, **shape)
+        columns = np.column_stack([columns, signals.sign[:, 0]])
+        left.append(np.var(torque - columns @ np.linalg.lstsq(columns, torque, rcond=None)[0]))
+    assert min(left) < 0.005 * np.var(warm)
+
+
 def test_a_change_in_the_last_recording_alone_is_not_tried(signals):
     effect = get_effect("friction_drift")
     moments = [shape["since"] for shape in effect.grid(signals, (0,)) if "since" in shape]
