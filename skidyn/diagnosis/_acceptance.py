@@ -21,7 +21,7 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._ranking import RankingSearch
-from skidyn.diagnosis._rule import ALL_LEFT, NEARER, NEARLY, TAKEN_BACK
+from skidyn.diagnosis._rule import ALL_LEFT, IMITATED, NEARER, NEARLY, TAKEN_BACK
 from skidyn.effects import NamelessEffect, get_effect
 from skidyn.evidence import weighted_least_squares
 
@@ -342,6 +342,17 @@ class JudgingSearch(RankingSearch):
             rest = [c for i, c in enumerate(rest) if i != worst]
         return rest
 
+    def due_to_positions(self, hypothesis: Hypothesis) -> bool:
+        """Whether noise of the positions alone explains much of what an explanation removes."""
+        reached = {j for c in hypothesis.candidates for j in c.rows}
+        if hypothesis.torque is not None or not reached & self.coarse():
+            return False
+        tester, imitation = self.tester(self.chosen), self.imitation()
+        removed = sum(tester.test(c.rows).drop for c in hypothesis.candidates)
+        rows = (imitation.problem.term_rows(c.term) for c in hypothesis.candidates)
+        imitated = sum(imitation.test(own).drop for own in rows)
+        return imitated > IMITATED * removed
+
     def shadow(self, hypothesis: Hypothesis) -> bool:
         """Whether an explanation is small enough to be an error of earlier, imperfect formulas."""
         # Its gain may be on other joints: what is wrong on one also changes the bodies of others.
@@ -402,36 +413,20 @@ class JudgingSearch(RankingSearch):
             self.of_one_position(h, joint) and (small or h.kind == UNKNOWN) for h in self.findings
         )
 
-    def of_one_position(self, hypothesis: Hypothesis, joint: int) -> bool:
-        """Whether on a joint it is a force over the position of this joint, in all recordings.
-
-        Parameters
-        ----------
-        hypothesis : Hypothesis
-            A known effect or an unknown function.
-        joint : int
-            Joint, from 0.
-        """
-        if within_recordings(hypothesis) or joint not in hypothesis.joints:
-            return False
-        if hypothesis.kind == UNKNOWN:
-            return hypothesis.torque is None and hypothesis.variables == (f"q{joint + 1}",)
-        own = [c.term for c in hypothesis.candidates if joint in c.joints]
-        return all(term.follows_position for term in own)
-
     def _tolerance(self, beside: Hypothesis) -> Array:
         """Share of the removed squared error that imperfect formulas may leave, by joint.
 
         The formula of an oscillating link is of first order: it leaves more to an unknown function,
         and to a delay, which is the first order of any lag. A part of the recordings is chosen for
-        what the formula leaves there.
+        what the formula leaves there. Of a family, the simplest formula that explains nearly as
+        much as the best one is used, which leaves the rest.
         """
         settings = self.settings
         first_order = beside.kind == UNKNOWN or any(
             c.term.effect.is_slow for c in beside.candidates
         )
         shares = np.full(self.problem.n_joints, settings.exact_tolerance)
-        for h in self.findings:
+        for h in [*self.earlier, *self.findings]:
             if h.kind == UNKNOWN and h.torque is not None:
                 continue
             nameless = h.kind == UNKNOWN
@@ -441,6 +436,8 @@ class JudgingSearch(RankingSearch):
                 swings = c.term.effect.moves_link and first_order
                 loose = nameless or swings or in_part(beside)
                 share = settings.nameless_tolerance if loose else settings.form_tolerance
+                if c.term.effect.family:
+                    share = max(share, 1 - settings.family_share)
                 reached = list(c.rows)
                 shares[reached] = np.maximum(shares[reached], share)
         return shares
@@ -464,7 +461,8 @@ class JudgingSearch(RankingSearch):
     def _at_its_limit(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """The hypothesis, or the simpler kind that is equivalent to its unresolved terms.
 
-        Pre-sliding that is too short to be resolved is Coulomb friction. Resolved terms are then
+        Pre-sliding that is too short to be resolved is Coulomb friction, and friction that differs
+        between the directions by a constant only is an offset. Resolved terms are then
         searched again in addition to it. A shape parameter at the far end of its range indicates
         another effect.
         """
@@ -473,7 +471,8 @@ class JudgingSearch(RankingSearch):
             return None
         if len(inside) < len(hypothesis.candidates):
             hypothesis = replace(hypothesis, candidates=inside)
-        unresolved = {c: kind for c in hypothesis.candidates if (kind := self._limit_kind(c))}
+        together = hypothesis.candidates
+        unresolved = {c: kind for c in together if (kind := self._limit_kind(c, together))}
         if not unresolved:
             return hypothesis
         simple = [
@@ -497,15 +496,21 @@ class JudgingSearch(RankingSearch):
         far = self.settings.far_end * shapes[0].high * unit
         return bool(candidate.term.shape[shapes[0].name] >= far)
 
-    def _limit_kind(self, candidate: Candidate) -> str:
-        """The simpler kind that is equivalent to a candidate with an unresolved shape."""
+    def _limit_kind(self, candidate: Candidate, together: Sequence[Candidate]) -> str:
+        """The simpler kind that is equivalent to a candidate with an unresolved shape or size."""
         unit = self.problem.signals.unit[candidate.joints[0]]
         for shape in candidate.term.effect.shapes:
             low = shape.low * (unit if shape.scales else 1.0)
             value = candidate.term.shape.get(shape.name, np.inf)
             if shape.limit_kind and value < self.settings.resolved * low:
                 return shape.limit_kind
-        return ""
+        kinds = [c.limit_kind for c in candidate.term.coefficients]
+        if not any(kinds) or candidate.term.trajectories is not None:
+            return ""
+        rest = [c for c in together if c is not candidate]
+        tester = self.tester([*self.chosen, *rest])
+        chance = tester.test(candidate.rows, np.array([bool(kind) for kind in kinds])).chance
+        return "" if self.significant(chance, candidate) else next(filter(None, kinds))
 
     def _richer_known(self, hypothesis: Hypothesis) -> bool:
         """Whether an equally complex member of the family was found on the same joints."""

@@ -64,9 +64,7 @@ class Followed(NamedTuple):
     sums: list[Sum]
 
 
-def followed_signals(
-    problem: Problem, joint: int, residual: Array, *, accelerations: bool = True
-) -> Followed:
+def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     """Sets of signals, and sums of positions, on which the residual of a joint may depend.
 
     Parameters
@@ -77,17 +75,10 @@ def followed_signals(
         Joint, from 0.
     residual : ndarray of shape (n_samples,)
         Residual of the model, N m or N.
-    accelerations : bool, default=True
-        Whether it may be a function of accelerations. Those of coarse positions are mostly noise,
-        which is in the residual as well.
     """
     y = average_at_rows(problem, joint, residual)
     step = max(1, -(-len(y) // MOST_ROWS))
-    signals = {
-        name: x[::step]
-        for name, x in averaged_signals(problem, joint).items()
-        if accelerations or not name.startswith("ddq")
-    }
+    signals = {name: x[::step] for name, x in averaged_signals(problem, joint).items()}
     y = y[::step]
     # numbered without gaps: dropped trajectories must not leave an empty quarter below
     numbers, fold = np.unique(problem.fold[joint][::step], return_inverse=True)

@@ -29,7 +29,6 @@ def nameless_candidates(
     residual: Array,
     *,
     followed_on: Collection[int] | None = None,
-    coarse: Collection[int] = (),
 ) -> list[Candidate]:
     """Unknown functions of the signals for every joint.
 
@@ -42,9 +41,6 @@ def nameless_candidates(
     followed_on : collection of int, optional
         Joints, from 0, for which only functions of signals found from the residual are made; by
         default all unknown functions of all joints.
-    coarse : collection of int, default=()
-        Joints, from 0, whose torque has more noise from positions than from its sensor: no
-        functions of accelerations are made for them.
 
     Returns
     -------
@@ -57,7 +53,7 @@ def nameless_candidates(
     looked_at = range(problem.n_joints) if followed_on is None else followed_on
 
     def follow(j: int) -> Followed:
-        return followed_signals(problem, j, residual[:, j], accelerations=j not in coarse)
+        return followed_signals(problem, j, residual[:, j])
 
     found = each(follow, looked_at)
     followed = dict(zip(looked_at, found, strict=True))
@@ -69,8 +65,6 @@ def nameless_candidates(
         for joints in effect.sites(few):
             joint = joints[0]
             if effect.search == "spectrum" or effect.not_shown(few, joint):
-                continue
-            if effect.drawn_against == "ddq" and joint in coarse:
                 continue
             if followed_on is not None and (effect.search != "screened" or joint not in followed):
                 continue

@@ -30,6 +30,7 @@ from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recordings import DRIFT, FRICTION, choose, drifting, own_friction
 from skidyn.diagnosis._rule import (
     ALL_LEFT,
+    FEW_WAVES,
     MASKED,
     NEARLY,
     RESOLVED,
@@ -421,13 +422,7 @@ class RankingSearch(SearchState):
         found = []
         least = self.settings.least_share
         if "torque_ripple" in self.kinds:
-            # A few waves per turn are errors of an unknown function at the ends of its range.
-            lines = [
-                line
-                for line in find_lines(problem, residual, self.significant)
-                if line.term.shape["N"] * problem.signals.unit[line.joint] >= RESOLVED
-                or not self._follows_position(line.joint)
-            ]
+            lines = list(filter(self._is_ripple, find_lines(problem, residual, self.significant)))
             shortest = 1.0 / problem.signals.unit.max()
             found.append(self._of_lines("torque_ripple", "N", shortest, lines, least))
         if self.vibration:
@@ -477,12 +472,35 @@ class RankingSearch(SearchState):
         chances = tuple(best[c.joints[0]].chance for c in candidates)
         return Hypothesis(kind, tuple(candidates), gain, score, count, chances, torque=torque)
 
-    def _follows_position(self, joint: int) -> bool:
-        """Whether an unknown function of the joint's own position was added."""
-        own = f"q{joint + 1}"
-        return any(
-            h.kind == UNKNOWN and own in h.variables and joint in h.joints for h in self.findings
-        )
+    def _is_ripple(self, line: Line) -> bool:
+        """Whether a line has too many waves to be an error of another function of the position."""
+        joint, signals = line.joint, self.problem.signals
+        own, waves = f"q{joint + 1}", line.term.shape["N"]
+        for h in self.findings:
+            nameless = h.kind == UNKNOWN and own in h.variables and joint in h.joints
+            if nameless and waves * signals.unit[joint] < RESOLVED:
+                return False
+            few = waves * np.ptp(signals.q[:, joint]) < 2 * np.pi * FEW_WAVES
+            if few and self.of_one_position(h, joint):
+                return False
+        return True
+
+    def of_one_position(self, hypothesis: Hypothesis, joint: int) -> bool:
+        """Whether on a joint it is a force over the position of this joint, in all recordings.
+
+        Parameters
+        ----------
+        hypothesis : Hypothesis
+            A known effect or an unknown function.
+        joint : int
+            Joint, from 0.
+        """
+        if within_recordings(hypothesis) or joint not in hypothesis.joints:
+            return False
+        if hypothesis.kind == UNKNOWN:
+            return hypothesis.torque is None and hypothesis.variables == (f"q{joint + 1}",)
+        own = [c.term for c in hypothesis.candidates if joint in c.joints]
+        return all(term.follows_position for term in own)
 
     def _against_functions(self, ripple: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
         """A ripple, judged on averaged rows if a function of the signals explains much more there.

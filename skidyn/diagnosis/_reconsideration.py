@@ -46,6 +46,8 @@ class ReconsideringSearch(JudgingSearch):
             best = self._first_of_two_names(best, offered)
             simpler = self._at_its_limit(best)
             judged = None if simpler is None else self.judged(simpler)
+            if judged is not None and self.due_to_positions(judged):
+                judged = None
             if judged is not None:
                 judged, is_piece = self.without_pieces(judged)
                 traced |= set(judged.joints) if is_piece else set()
@@ -56,7 +58,9 @@ class ReconsideringSearch(JudgingSearch):
                     shadows.add(own)
             if judged is not None:
                 judged = self._offset_later(judged)
-                rivals = rivals_among(judged, offered)
+                # what equals a simpler kind is no rival of it
+                replaced = best.kind if simpler is not None and simpler.kind != best.kind else ""
+                rivals = rivals_among(judged, [h for h in offered if h.kind != replaced])
                 margin, alike = margin_over(judged, rivals), self._alike(judged, rivals)
                 elsewhere = self._elsewhere(judged)
                 judged = replace(judged, margin=margin, alike=alike, elsewhere=elsewhere)

@@ -2,7 +2,8 @@
 """The rule for findings: test, variance, level, and withdrawal.
 
 Every explanation of the residual, known or unknown, of all recordings or of some, passes
-:meth:`Rule.accepts` before it becomes a finding and :meth:`Rule.withdrawn` after each later one.
+:meth:`Tester.test` before it becomes a finding (``_acceptance.py``) and beside each later one
+(``_reconsideration.py``, ``_withdrawal.py``).
 
 **Test.** The coefficients of one candidate together with all others of the model, all fitted again.
 The size and correlation of the residual *with* the candidate are used: a missing smooth torque
@@ -64,8 +65,15 @@ FEWEST_BLOCKS, ENOUGH_BLOCKS = 6, 8
 #: Share of the level that is kept for effects in few blocks, and degrees of freedom with which the
 #: noise of these blocks is assumed to be like that of all (``placebo.py``).
 IN_FEW_BLOCKS, LIKE_ELSEWHERE = 0.1, 16.0
+#: Cut-off in Hz of the motion along which noisy positions are imitated (``_imitation.py``), and
+#: share of what an explanation removes that it must not remove there, too
+#: (``nothing_hidden.py --bits 12``).
+SLOW_MOTION, IMITATED = 6.0, 0.3
 #: Waves per turn from which an unknown function of position cannot represent torque ripple.
 RESOLVED = 40.0
+#: Waves over the travel of a joint below which a ripple beside a force over its position is an
+#: error of the formula of this force.
+FEW_WAVES = 4.0
 #: A column of which less than this share is new to the model is not tested.
 NEW_SHARE = 1e-6
 #: Relative rounding error of what a column removes, found from products.

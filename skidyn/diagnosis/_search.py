@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from skidyn.diagnosis._hypothesis import SearchResult
+from skidyn.diagnosis._hypothesis import Hypothesis, SearchResult
 from skidyn.diagnosis._reconsideration import ReconsideringSearch
 from skidyn.diagnosis._rule import Settings
 from skidyn.evidence import Problem
@@ -21,6 +21,7 @@ def search(
     nameless: bool = True,
     vibration: bool = True,
     joints: Sequence[int] | None = None,
+    earlier: Sequence[Hypothesis] = (),
 ) -> SearchResult:
     """Fit the model, and find the missing effects.
 
@@ -38,12 +39,16 @@ def search(
         Whether a wave in time is one of them.
     joints : sequence of int, optional
         Joints, from 0, on which effects are tried; all by default.
+    earlier : sequence of Hypothesis, optional
+        Findings of another search, whose terms are in the model: what removes little of what they
+        removed may be an error of their formulas.
     """
     searcher = _Search(problem, kinds, settings, nameless)
     searcher.vibration &= vibration
     if joints is not None:
         searcher.pool = [c for c in searcher.pool if set(c.joints) <= set(joints)]
         searcher.nameless = False
+    searcher.earlier = list(earlier)
     return searcher.run()
 
 
@@ -52,6 +57,7 @@ class _Search(ReconsideringSearch):
 
     def run(self) -> SearchResult:
         """Add one finding after the other."""
+        self.start = self.left_without(self.earlier)
         for _ in range(self.settings.max_findings):
             self.sigma = self.weights()
             self.left = self._left()

@@ -14,11 +14,8 @@ from skidyn._last import LastResults
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
 from skidyn.diagnosis._held_out import shares_of_folds
-from skidyn.diagnosis._hypothesis import (
-    UNKNOWN,
-    Hypothesis,
-    uses_the_fit,
-)
+from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, terms_on_rows, uses_the_fit
+from skidyn.diagnosis._imitation import imitate
 from skidyn.diagnosis._nameless_candidates import nameless_candidates
 from skidyn.diagnosis._noise import sensor_noise
 from skidyn.diagnosis._profile import profile_error
@@ -61,20 +58,22 @@ class SearchState:
         self.settings = settings
         self.kinds = list(kinds)
         self.vibration = nameless
+        #: Whether noise of positions is considered: if derivatives come from them, and not for rows
+        #: of other windows.
+        logged, smooth = problem.logged, problem.signals
+        self.weighs_positions = nameless and logged is not None and smooth.q is not logged.q
         self.ripple = np.zeros_like(problem.torque)
         self.chosen: list[Candidate] = []
         self.findings: list[Hypothesis] = []
+        #: Findings of another search, which the problem's terms contain.
+        self.earlier: list[Hypothesis] = []
         base = problem.fit_own()
         self.fit, self.sigma = base, base.noise
         self.pool = catalogue_candidates(problem, self.kinds, settings.size_share)
         self.nameless = nameless and bool(settings.max_findings)
         if self.nameless:
             self._followed = problem.torque - problem.explained(base)
-            # all noise of the residual: that of the sensor, and that from the positions
-            noise = np.nan_to_num(sensor_noise(problem.signals, self._followed))
-            coarse = 2 * position_noise(problem, base) ** 2 > noise**2
-            self._coarse = np.flatnonzero(coarse).tolist()
-            self.pool += nameless_candidates(problem, self._followed, coarse=self._coarse)
+            self.pool += nameless_candidates(problem, self._followed)
         self.by_recording = recording_candidates(problem, self.kinds)
         self.n_tests = max(1, len(self.pool) + len(self.by_recording))
         self.whole_pool = self.pool
@@ -204,7 +203,7 @@ class SearchState:
         self._followed = before.copy()
         self._followed[:, joints] = residual[:, joints]
         known = {c.term for c in self.whole_pool}
-        found = nameless_candidates(self.problem, residual, followed_on=joints, coarse=self._coarse)
+        found = nameless_candidates(self.problem, residual, followed_on=joints)
         new = [c for c in found if c.term not in known]
         self.pool, self.whole_pool = [*self.pool, *new], [*self.whole_pool, *new]
         self.n_tests += len(new)
@@ -224,6 +223,27 @@ class SearchState:
         )
         tried = self.n_tests * (self.settings.nameless_tried if one_of_many else 1)
         return tried * (1.0 if candidate is None else candidate.n_parts)
+
+    def coarse(self) -> set[int]:
+        """Joints, from 0, most of whose noise is that of positions."""
+        problem = self.problem
+        if not self.weighs_positions or problem.robot is None or problem.of_residual:
+            return set()
+        residual = self.residual
+        sensor = np.nan_to_num(sensor_noise(problem.signals, residual))
+        return set(np.flatnonzero(2 * position_noise(problem, self.fit) ** 2 > sensor**2).tolist())
+
+    def imitation(self) -> Tester:
+        """Tests on the log as it would be if the present model lacked nothing."""
+
+        def make() -> Tester:
+            terms = self.problem.terms + (c.term for c in self.chosen)
+            imitated = imitate(self.problem, replace(self.fit, terms=terms))
+            blocks = [imitated.term_rows(term) for term in imitated.terms]
+            return Tester(imitated, blocks, self.sigma, imitated.target)
+
+        tester: Tester = self._last.get("imitation", self._made_of, make)
+        return tester
 
     def chance(self, candidate: Candidate, others: Sequence[Candidate]) -> float:
         """P-value of a candidate's coefficients given the model and other candidates."""
@@ -276,6 +296,21 @@ class SearchState:
         """Held-out squared error of every joint with all findings so far."""
         left: Array = self.errors_now().sum(0)
         return left
+
+    def left_without(self, findings: Sequence[Hypothesis]) -> Array:
+        """Held-out squared error of every joint without some terms of the problem's model.
+
+        Parameters
+        ----------
+        findings : sequence of Hypothesis
+            Findings with these terms; 0 is returned if there are none.
+        """
+        found = set(terms_on_rows(findings))
+        if not found:
+            return np.zeros(self.problem.n_joints)
+        blocks = [self.problem.term_rows(t) for t in self.problem.terms if t not in found]
+        error: Array = profile_error(self.problem, blocks, self.sigma, self.target).sum(0)
+        return error
 
     @property
     def _counts(self) -> NDArray[np.int64]:

@@ -81,7 +81,7 @@ def look_at_swift(
         gates = replace(settings, max_findings=room, least_gain=least, size_share=size)
         slowed = {j for h in slow for c in h.candidates if c.term.effect.is_slow for j in c.joints}
         joints = [j for j in range(problem.n_joints) if j not in slowed]
-        moved = search(short, family, gates, nameless=False, joints=joints)
+        moved = search(short, family, gates, nameless=False, joints=joints, earlier=slow)
         now = {j: h.kind for h in moved.findings for j in h.joints}
         fastest = [
             c.term.effect.fastest(c.term.shape) for h in moved.findings for c in h.candidates

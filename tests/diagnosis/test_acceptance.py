@@ -25,6 +25,18 @@ def test_friction_whose_presliding_is_too_short_to_be_seen_is_coulomb_friction(a
     assert kinds == {"coulomb": {1, 2}}
 
 
+def test_offsets_beside_friction_that_differs_between_directions_are_offsets(arm_log, found_in):
+    speed = np.abs(arm_log.X["dq1"].to_numpy())
+    torque = np.array(arm_log.y)
+    size = np.std(torque, axis=0)
+    torque[:, 0] += 0.3 * size[0] * speed**0.8
+    torque[:, 1] -= 0.3 * size[1]
+
+    found = found_in(load_planar_arm(), arm_log.X, torque)
+
+    assert found == {"asymmetric_friction": {1}, "offset": {2}}
+
+
 @pytest.mark.slow
 def test_a_limit_of_the_drive_is_read_although_the_friction_had_bent_toward_it(arm_log):
     torque = np.array(arm_log.y)

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The log as it would be if the present model were complete and only its positions were noisy.
+
+Accelerations from coarse encoders have an error that depends on the motion: the rounding of a slow
+joint is a slow sawtooth, and the same for equal motion. It is correlated with columns that are
+computed from the same positions, so that its torque looks like an effect, and no test on the
+residual tells them apart. It can be imitated, since the rounding is known [1]_: the model is
+evaluated along a slow motion without noise, whose positions are then rounded, or made as noisy as
+those of the log, and smoothed in the same way. What a candidate removes there is due to the
+positions.
+
+References
+----------
+.. [1] B. Efron, R. J. Tibshirani (1993), An introduction to the bootstrap, Chapman & Hall, chapter
+   16.4 (testing with a model of the null hypothesis).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from skidyn._signals import Signals
+from skidyn.diagnosis._noise import MEDIAN
+from skidyn.diagnosis._rule import SLOW_MOTION
+from skidyn.evidence import Fit, Problem, make_problem, smooth_motion
+from skidyn.measurement import position_step
+
+
+def imitate(problem: Problem, fit: Fit) -> Problem:
+    """The problem of a log that a model explains except for the noise of its positions.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows, motion and logged positions.
+    fit : Fit
+        The model, with its terms.
+
+    Returns
+    -------
+    Problem
+        The same terms on imitated positions, with the torque of the model.
+    """
+    logged, robot = problem.logged, problem.robot
+    assert logged is not None
+    assert robot is not None
+    slow = smooth_motion(logged, SLOW_MOTION)
+    kept = {name: getattr(slow, name) for name in ("q", "dq", "ddq")}
+    along = replace(problem, signals=problem.signals.with_(**kept), _cache={}, _thinned={})
+    along.set_fit(fit)
+    torque = along.explained(fit) + robot.inverse_dynamics(slow.q, slow.dq, slow.ddq)
+    imitated = make_problem(
+        logged.with_(q=_measured(logged, slow, problem.signals), dq=slow.dq, ddq=slow.ddq),
+        torque,
+        robot=robot,
+        rigid_body=problem.rigid_body,
+        terms=fit.terms,
+    )
+    imitated.fit_own()
+    return imitated
+
+
+def _measured(logged: Signals, slow: Signals, smooth: Signals) -> np.ndarray:
+    """Positions of a slow motion, as the sensors of the log would state them."""
+    noise = np.median(np.abs(logged.q - smooth.q), axis=0) / MEDIAN
+    q = slow.q + np.random.default_rng(0).normal(size=slow.q.shape) * noise
+    for k, step in enumerate(map(position_step, logged.q.T)):
+        if np.isfinite(step):
+            q[:, k] = step * np.round(slow.q[:, k] / step)
+    return q
