@@ -55,11 +55,20 @@ from skidyn.diagnosis._rule import (
     EPISODE_LEAST_NOISE,
     EPISODE_LEAST_RANGE,
     MUCH,
+    Settings,
     false_discovery_rate,
 )
 from skidyn.diagnosis._search_state import replace_torque
 from skidyn.diagnosis._unknown import UnknownTorque, describe_unknowns
-from skidyn.diagnosis._withdrawal import drop_of, guess, slight, to_withdraw, useless, without
+from skidyn.diagnosis._withdrawal import (
+    drop_of,
+    guess,
+    slight,
+    to_withdraw,
+    unsupported,
+    useless,
+    without,
+)
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 
@@ -71,9 +80,10 @@ def conclude(
     sliding: NDArray[np.bool_],
     torque: Array,
     notes: list[str],
-    least_drop: float,
+    settings: Settings,
     model: Any,
     data: tuple[Any, ...],
+    withdrawn: bool = False,
 ) -> Diagnosis:
     """Make a diagnosis from the result of a search.
 
@@ -91,12 +101,14 @@ def conclude(
         Measured torque, N m or N.
     notes : list of str
         Remarks on the data.
-    least_drop : float
-        Share of the error of samples that a finding must remove.
+    settings : Settings
+        Thresholds: level, and share of the error of samples that a finding must remove.
     model : regressor
         The model as given.
     data : tuple
         X and torque as given.
+    withdrawn : bool, default=False
+        Whether a finding was withdrawn, so that others may no longer be significant.
     """
     robot = problem.robot
     assert robot is not None
@@ -112,7 +124,7 @@ def conclude(
             for c, entry, average in zip(comparisons, history, averages, strict=True)
         ]
         noise = sensor_noise(problem.signals, residual), position_noise(problem, result.fit)
-        needless = useless(problem, result, errors, noise, least_drop)
+        needless = useless(problem, result, errors, noise, settings.least_drop)
         if needless is not None and all(
             h is not needless[0] for h in [*tried_last, result.findings[-1]]
         ):
@@ -122,9 +134,11 @@ def conclude(
             result = replace(result, findings=order)
             continue
         wrong = needless or to_withdraw(problem, result, fixed)
+        if wrong is None and withdrawn:
+            wrong = unsupported(problem, result, settings.level)
         if wrong is None:
             break
-        result = without(problem, result, *wrong)
+        result, withdrawn = without(problem, result, *wrong), True
     intervals = parameter_intervals(problem, terms, result.fit.noise)
     shown, remarks = [entry["rmse"] for entry in history], list(notes)
     if not is_physics(model):
@@ -196,7 +210,7 @@ def conclude(
     if wrong is None:
         return diagnosis
     rest = without(problem, result, *wrong)
-    other = conclude(problem, rest, limits, sliding, torque, notes, least_drop, model, data)
+    other = conclude(problem, rest, limits, sliding, torque, notes, settings, model, data, True)
     # "Nothing is missing" would be wrong: something is, and this is the most likely name.
     only = len(result.findings) == 1 and other.verdict == "complete"
     return diagnosis if only and max(f.error_drop for f in findings) > MUCH else other

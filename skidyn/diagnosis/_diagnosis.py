@@ -324,9 +324,8 @@ def _diagnose(
     limits = _limits(problem, result, completed, settings)
     give_back()
     sliding = problem.rows.sliding
-    least = settings.least_drop
     data = (X, tau) if weight is None else (X, tau, weight)
-    diagnosis = conclude(wider, completed, limits, sliding, judged, notes, least, model, data)
+    diagnosis = conclude(wider, completed, limits, sliding, judged, notes, settings, model, data)
     diagnosis.checks = checks
     diagnosis.findings = [_beside_doubts(f, checks) for f in diagnosis.findings]
     kept = {c.site for h in diagnosis.result.findings for c in h.candidates}

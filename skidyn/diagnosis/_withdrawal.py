@@ -2,9 +2,9 @@
 """Withdrawal of findings: everything that was found is judged again beside all others.
 
 A finding is withdrawn if it does not reduce the error of samples (:func:`useless`), if its size may
-be zero or cannot be (:func:`to_withdraw`), or if it is more likely wrong than right
-(:func:`guess`). One that is too small to matter stays in the completed model without being listed
-(:func:`slight`).
+be zero or cannot be (:func:`to_withdraw`), if it is more likely wrong than right (:func:`guess`),
+or if it is not significant without another one that was withdrawn (:func:`unsupported`). One that
+is too small to matter stays in the completed model without being listed (:func:`slight`).
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from skidyn.diagnosis._hypothesis import (
     SearchResult,
     found_terms,
     on_samples,
+    within_recordings,
 )
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._rule import (
@@ -35,6 +36,8 @@ from skidyn.diagnosis._rule import (
     LITTLE,
     SURE_OF_LITTLE,
     UNLIKELY,
+    Tester,
+    false_discovery_rate,
 )
 from skidyn.diagnosis._search_state import replace_torque
 from skidyn.effects import Term, get_effect
@@ -110,6 +113,40 @@ def useless(
                 terms.append(candidate)
         if terms:
             return result.findings[k], terms
+    return None
+
+
+def unsupported(problem: Problem, result: SearchResult, level: float) -> Withdrawal | None:
+    """The last finding with terms that are not significant without what was withdrawn.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds on which effects are judged.
+    result : SearchResult
+        Findings and the final fit, after a withdrawal.
+    level : float
+        Probability of a false finding over all tested candidates.
+    """
+    target = [
+        problem.rows.average(problem.torque[:, j] - result.ripple[:, j], j)
+        for j in range(problem.n_joints)
+    ]
+    known = [t for t in found_terms(problem, result.findings) if not on_samples(t)]
+    for hypothesis in reversed(result.findings):
+        together = len(hypothesis.candidates) > 2 and within_recordings(hypothesis)
+        if hypothesis.torque is not None or together:
+            continue  # judged on samples, or together
+        terms = []
+        for candidate in hypothesis.candidates:
+            others = [t for t in (*problem.terms, *known) if t != candidate.term]
+            blocks = [problem.term_rows(t) for t in others]
+            tester = Tester(problem, blocks, result.fit.noise, target)
+            chance = tester.test(problem.term_rows(candidate.term), candidate.zeros).chance
+            if false_discovery_rate(chance, hypothesis.tried) > level:
+                terms.append(candidate)
+        if terms:
+            return hypothesis, terms
     return None
 
 

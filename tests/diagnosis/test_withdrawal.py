@@ -35,3 +35,15 @@ def test_a_delay_within_half_a_sampling_step_is_a_remark_and_no_finding(delay, i
     assert [f.kind for f in diagnosis.findings] == ["time_delay"] * is_named
     assert any("half of the sampling step" in note for note in diagnosis.warnings) != is_named
     assert diagnosis.verdict == ("missing" if is_named else "complete")
+
+
+@pytest.mark.slow
+def test_what_was_significant_beside_a_withdrawn_function_only_is_not_named(arm_log, found_in):
+    """A function of the noisy accelerations of coarse encoders does not predict samples better."""
+    X, torque, step = arm_log.X.copy(), np.array(arm_log.y), 2 * np.pi / 2**12
+    drum = X["ddq1"] * X["q1"] ** 2
+    torque[:, 0] += 0.4 * np.std(torque[:, 0]) * drum / np.std(drum)
+    for name in ("q1", "q2"):
+        X[name] = np.round(X[name] / step) * step
+
+    assert set(found_in(load_planar_arm(), X, torque)) == {"unknown"}
