@@ -19,13 +19,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from skidyn._signals import Signals
-from skidyn.diagnosis._noise import MEDIAN
+from skidyn.diagnosis._noise import as_measured
 from skidyn.diagnosis._rule import SLOW_MOTION
 from skidyn.evidence import Fit, Problem, make_problem, smooth_motion
-from skidyn.measurement import position_step
 
 
 def imitate(problem: Problem, fit: Fit) -> Problem:
@@ -51,8 +47,9 @@ def imitate(problem: Problem, fit: Fit) -> Problem:
     along = replace(problem, signals=problem.signals.with_(**kept), _cache={}, _thinned={})
     along.set_fit(fit)
     torque = along.explained(fit) + robot.inverse_dynamics(slow.q, slow.dq, slow.ddq)
+    q = as_measured(logged, problem.signals, slow.q, shifted=False)
     imitated = make_problem(
-        logged.with_(q=_measured(logged, slow, problem.signals), dq=slow.dq, ddq=slow.ddq),
+        logged.with_(q=q, dq=slow.dq, ddq=slow.ddq),
         torque,
         robot=robot,
         rigid_body=problem.rigid_body,
@@ -60,13 +57,3 @@ def imitate(problem: Problem, fit: Fit) -> Problem:
     )
     imitated.fit_own()
     return imitated
-
-
-def _measured(logged: Signals, slow: Signals, smooth: Signals) -> np.ndarray:
-    """Positions of a slow motion, as the sensors of the log would state them."""
-    noise = np.median(np.abs(logged.q - smooth.q), axis=0) / MEDIAN
-    q = slow.q + np.random.default_rng(0).normal(size=slow.q.shape) * noise
-    for k, step in enumerate(map(position_step, logged.q.T)):
-        if np.isfinite(step):
-            q[:, k] = step * np.round(slow.q[:, k] / step)
-    return q

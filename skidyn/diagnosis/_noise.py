@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Noise of the torque sensor: the part that changes faster than any motion.
+"""Noise of the torque sensor, and positions as noisy as those of a log.
 
-Third differences of the residual remove everything that is smooth over four samples, such as
-torques that depend on the motion, and leave the sensor's noise. Their median magnitude is used,
-which few disturbed samples do not affect. Noise that is correlated over several samples is not
-included: the value is a lower bound, and the remainder is compared with a multiple of it.
+The noise of the torque is the part that changes faster than any motion. Third differences of the
+residual remove everything that is smooth over four samples, such as torques that depend on the
+motion, and leave the sensor's noise. Their median magnitude is used, which few disturbed samples do
+not affect. Noise that is correlated over several samples is not included: the value is a lower
+bound, and the remainder is compared with a multiple of it.
 """
 
 from __future__ import annotations
@@ -12,11 +13,42 @@ from __future__ import annotations
 import numpy as np
 
 from skidyn._signals import Array, Signals
+from skidyn.measurement import position_step
 
 #: Variance of the third difference of white noise of unit variance: 1 + 9 + 9 + 1.
 GAIN = 20.0
 #: Median of the absolute value of a normal variable.
 MEDIAN = 0.6744897501960817
+
+
+def as_measured(logged: Signals, smooth: Signals, q: Array, *, shifted: bool) -> Array:
+    """Positions along a path with noise like that of logged ones.
+
+    The noise is the part that a smoother removes from the logged positions, drawn at random; if an
+    encoder has visible steps, positions are rounded to these instead.
+
+    Parameters
+    ----------
+    logged, smooth : Signals
+        Logged motion, and the same smoothed.
+    q : ndarray of shape (n_samples, n_joints), rad or m
+        The path.
+    shifted : bool
+        Whether the steps begin at a random position, as for a path that was smoothed from rounded
+        positions, or at zero.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_joints), rad or m
+    """
+    taken = np.median(np.abs(logged.q - smooth.q), axis=0) / MEDIAN
+    rng = np.random.default_rng(0)
+    noise = rng.normal(size=q.shape) * taken
+    for k, step in enumerate(map(position_step, logged.q.T)):
+        if np.isfinite(step):
+            counted = q[:, k] / step + (rng.uniform() if shifted else 0.0)
+            noise[:, k] = step * (np.round(counted) - counted)
+    return np.asarray(q + noise)
 
 
 def sensor_noise(signals: Signals, residual: Array) -> Array:

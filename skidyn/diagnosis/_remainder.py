@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
-from skidyn.diagnosis._noise import MEDIAN, sensor_noise
+from skidyn.diagnosis._noise import as_measured, sensor_noise
 from skidyn.diagnosis._rule import (
     COLOURED_ALIKE,
     COLOURED_FEWEST_JOINTS,
@@ -29,7 +29,6 @@ from skidyn.diagnosis._rule import (
     variance_inflation,
 )
 from skidyn.evidence import Fit, Problem, smooth_motion
-from skidyn.measurement import position_step
 
 #: Quantiles that define the range of the torque.
 RANGE = (0.005, 0.995)
@@ -209,16 +208,10 @@ def position_noise(problem: Problem, fit: Fit | None = None) -> Array:
 
 def _shaken(logged: Signals, motion: Signals) -> tuple[Signals, Signals]:
     """The smoothed motion with and without the noise of positions, both smoothed again."""
-    taken = np.median(np.abs(logged.q - motion.q), axis=0) / MEDIAN
     part = slice(0, min(logged.n_samples, MOST_SAMPLES))
     smooth = motion.take(part)
-    rng = np.random.default_rng(0)
-    noise = rng.normal(size=smooth.q.shape) * taken
-    for k, step in enumerate(map(position_step, logged.q.T)):
-        if np.isfinite(step):
-            counted = smooth.q[:, k] / step + rng.uniform()
-            noise[:, k] = step * (np.round(counted) - counted)
-    return smooth_motion(smooth.with_(q=smooth.q + noise)), smooth_motion(smooth)
+    shaken = smooth.with_(q=as_measured(logged, motion, smooth.q, shifted=True))
+    return smooth_motion(shaken), smooth_motion(smooth)
 
 
 def _torque(problem: Problem, fit: Fit | None, motion: Signals) -> Array:

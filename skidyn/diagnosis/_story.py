@@ -292,8 +292,9 @@ def _first_clear(weights: Sequence[Sequence[float]]) -> int:
     """The first parameter whose interval excludes zero on every joint; else the clearest one."""
     fewest = min(map(len, weights), default=0)
     clear = [min(own[k] for own in weights) for k in range(fewest)]
-    first = next((k for k, weight in enumerate(clear) if weight > 1), None)
-    return int(np.argmax(clear)) if first is None and clear else first or 0
+    if not clear:
+        return 0
+    return next((k for k, weight in enumerate(clear) if weight > 1), int(np.argmax(clear)))
 
 
 def _step(history: Sequence[dict[str, Any]], finding: Finding) -> int | None:

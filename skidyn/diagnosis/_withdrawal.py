@@ -128,10 +128,7 @@ def unsupported(problem: Problem, result: SearchResult, level: float) -> Withdra
     level : float
         Probability of a false finding over all tested candidates.
     """
-    target = [
-        problem.rows.average(problem.torque[:, j] - result.ripple[:, j], j)
-        for j in range(problem.n_joints)
-    ]
+    target = replace_torque(problem, problem.torque - result.ripple).target
     known = [t for t in found_terms(problem, result.findings) if not on_samples(t)]
     for hypothesis in reversed(result.findings):
         together = len(hypothesis.candidates) > 2 and within_recordings(hypothesis)

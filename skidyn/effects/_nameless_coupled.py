@@ -14,6 +14,14 @@ from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
 from skidyn.effects._second_order import second_order_filter
 
 
+def _with_size(shapes: list[dict[str, Any]], torque: Array | None) -> list[dict[str, Any]]:
+    """Shapes with the root mean square of the other joint's torque, N m or N; none without it."""
+    if torque is None:
+        return []
+    size = np.sqrt(np.mean(torque**2, axis=0))
+    return [shape | {"size": float(size[shape["other"]])} for shape in shapes]
+
+
 class FrictionOverOtherLoad(NamelessEffect):
     """Friction of one joint that grows with the load of another."""
 
@@ -28,10 +36,7 @@ class FrictionOverOtherLoad(NamelessEffect):
         return (f"dq{joint + 1}", f"tau{int(shape['other']) + 1}")
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        if signals.load is None:
-            return []
-        size = np.sqrt(np.mean(signals.load**2, axis=0))
-        return [s | {"size": float(size[s["other"]])} for s in self.others(signals, joints[0])]
+        return _with_size(self.others(signals, joints[0]), signals.load)
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.load is not None
@@ -62,29 +67,19 @@ class Crosstalk(NamelessEffect):
         return signals.model_torque[:, [int(shape["other"])]]
 
 
-class FunctionOfOtherTorque(NamelessEffect):
+class FunctionOfOtherTorque(Crosstalk):
     """A torque that depends on that of another joint: a bent gauge, a supply that both share."""
 
     kind = "function_of_other_torque"
-    drawn_against = "load"
     title = "Function of another joint's torque"
     formula = r"f(\tau_k)"
     coefficients = unnamed_coefficients(3)
-    needs = ("model_torque",)
-    is_of_one_number = True
-
-    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
-        return (f"tau{int(shape['other']) + 1}",)
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        if signals.model_torque is None:
-            return []
-        size = np.sqrt(np.mean(signals.model_torque**2, axis=0))
-        return [s | {"size": float(size[s["other"]])} for s in self.others(signals, joints[0])]
+        return _with_size(super().grid(signals, joints), signals.model_torque)
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        assert signals.model_torque is not None
-        torque = signals.model_torque[:, int(shape["other"])] / max(shape["size"], 1e-300)
+        torque = super().columns(signals, joint, **shape)[:, 0] / max(shape["size"], 1e-300)
         return np.column_stack([torque, np.abs(torque), torque * np.abs(torque)])
 
 

@@ -22,7 +22,7 @@ _CHANGES = 16
 #: Share of the recording before the last one in which a change that lasts is to be seen.
 _SHOWN = 0.02
 #: Ratio of the two time constants of a warm-up.
-FASTER = 4.0
+_FASTER = 4.0
 #: Temperature ranges over which the dependence on temperature levels off, K.
 _LEVELLING = ({"levels_over": 6.0}, {"levels_over": 15.0})
 
@@ -189,7 +189,7 @@ class FrictionDrift(Effect):
             later = (signals.clock >= shape["since"]).astype(float)
             return np.column_stack([later * dq, later * sign])
         since, span, slow = signals.clock - shape["t0"], shape["span"], shape["time_constant"]
-        x, y = (_risen(since / t) / _risen(span / t) for t in (slow, slow / FASTER))
+        x, y = (_risen(since / t) / _risen(span / t) for t in (slow, slow / _FASTER))
         bent = y - x
         return np.column_stack([x * dq, x * sign, bent * dq, bent * sign])
 
