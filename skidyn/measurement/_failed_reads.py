@@ -29,6 +29,9 @@ MOSTLY, LEADING = 0.5, 1 / 3
 #: Share of the other values of a channel that are nearer to the value than its long jumps, and
 #: share of jumps that are long.
 TYPICAL = 0.2
+#: How many times as many places as its negative a value has: a velocity at rest jumps by as much in
+#: both directions, whenever the position changes by a step and returns.
+MIRRORED = 3
 #: Least share of the failed reads of other channels in which a channel holds their value to have
 #: failed with them, and largest share of its rows with it elsewhere.
 TOGETHER, ELSEWHERE = 0.8, 0.5
@@ -156,6 +159,8 @@ def _placed(values: Array, trajectory: NDArray[np.int64]) -> dict[float, NDArray
         # nor do values far from a dead band return to it at once
         apart = np.abs(values[usual & (values != value)] - value)
         typical = np.quantile(jump[there], 1 - TYPICAL) >= np.quantile(apart, TYPICAL)
-        if several and typical and there.sum() > MOSTLY * np.sum(far & (held == value)):
+        mirrored = value != 0 and there.sum() < MIRRORED * np.sum(away & (held == -value))
+        mostly = there.sum() > MOSTLY * np.sum(far & (held == value))
+        if several and typical and mostly and not mirrored:
             found[float(value) + 0.0] = begins[there]  # no negative zero
     return found

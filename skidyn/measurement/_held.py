@@ -63,6 +63,7 @@ class HeldTorque(Check):
                 shares[k] = share
         held = np.flatnonzero(shares)
         if len(held):
+            measurement.slow |= set(held.tolist())
             yield self.suspicion(
                 f"the torque of {measurement.joints(held)} holds its last value",
                 f"in {100 * shares[held].max():.0f} % of the rows in which positions change: it is "

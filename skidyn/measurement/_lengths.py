@@ -38,7 +38,7 @@ LEAST_LENGTH, SLOPE = 1e-3, 1e-3
 #: Log-likelihood that other lengths must gain with bodies near the stated ones, also where the
 #: effect is there that takes most of their place, and with any bodies; and the first of these if
 #: positions are coarse, because errors of the accelerations are then not white.
-LEAST, CONFIRMED, LEAST_COARSE = 10.0, 3.0, 100.0
+LEAST, CONFIRMED, LEAST_COARSE = 25.0, 3.0, 100.0
 #: Least error of a length to be reported, in standard errors, and as a share.
 ERRORS, SHARE = 3.0, 0.03
 

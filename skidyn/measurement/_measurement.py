@@ -76,6 +76,8 @@ class Measurement:
         Number of units of the clock in a second; set by its check.
     millimetres : set of int, optional
         Joints, from 0, whose positions are reported to be in millimetres; set by their check.
+    slow : set of int, optional
+        Joints, from 0, whose torque alone is reported to come from a slower bus; set by its checks.
 
     Examples
     --------
@@ -113,6 +115,7 @@ class Measurement:
     mixed: bool = field(default=False, repr=False)
     clock: float = field(default=1.0, repr=False)
     millimetres: set[int] = field(default_factory=set, repr=False)
+    slow: set[int] = field(default_factory=set, repr=False)
     #: The motion before trajectories were cut and gaps of the clock were closed.
     recorded: Signals = field(init=False, repr=False)
     #: Rows to which positions jump; trajectories end before them.

@@ -21,8 +21,9 @@ from skidyn.measurement._suspicion import Suspicion
 #: Rows between two values of the slower bus that are tried, and orders of the differences: of held
 #: values, lines and cubic splines.
 PERIODS, ORDERS = range(2, 17), (1, 2, 4)
-#: Least log-likelihood gain of a period on all joints; share of the joints that must gain by it;
-#: how many times as large the largest differences are as the smallest ones, on one of them.
+#: Least log-likelihood gain of a period, on all joints or on one of them alone; share of the joints
+#: that must gain by it to have one bus; how many times as large the largest differences are as the
+#: smallest ones, on one of them.
 SURE, AGREEING, TIMES = 40.0, 0.6, 1.7
 #: Share of the steps of a recording that may differ from the usual one by more than half of it:
 #: over a shorter step, the noise of a difference is larger.
@@ -42,39 +43,76 @@ class SlowTorque(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if measurement.stale or measurement.smoothed or measurement.lost:
             return  # reported by another check, or rows have no number
-        for order in ORDERS:
-            found = _common_period(measurement, order)
-            if found is None:
-                continue
-            common, alike = found
-            told = sum(gain for gain, _ in alike.values())
-            largest = max(times for _, times in alike.values())
-            if told < SURE or largest < TIMES or len(alike) < AGREEING * sum(measurement.excited):
-                continue
-            measurement.stale = True
-            rate = float(f"{measurement.rate / common:.4g}")
-            way = "held" if order == 1 else "interpolated"
-            yield self.suspicion(
-                f"the torque was {way} between the values of a slower bus, at about {rate:g} Hz",
-                f"every {common} rows it {'changes' if order == 1 else 'bends'} up to "
-                f"{largest:.3g} times as much as in the rows between, equally on {len(alike)} "
-                f"joints, which improves the likelihood of these changes by {told:.0f}",
-                "suspected",
-                alike,
-                (f"--resample {rate:g}", f"resample_rate={rate:g}"),
-            )
-            return
+        tables = [(order, _periods(measurement, order)) for order in ORDERS]
+        for order, table in tables:
+            most = _best([(period, _total(own)) for period, own in table])
+            alike = {k: one for k, one in dict(table).get(most, {}).items() if one[0] > 0}
+            if _shows(alike) and len(alike) >= AGREEING * sum(measurement.excited):
+                measurement.stale = True
+                gained = f"equally on {len(alike)} joints, which improves"
+                yield self._of(measurement, order, most, alike, "the torque", gained)
+                return
+        for order, table in tables:
+            joints = sorted({k for _, own in table for k in own} - measurement.slow)
+            for k in joints:
+                most = _best([(period, own[k][0]) for period, own in table])
+                alone = {k: dict(table)[most][k]} if most else {}
+                if _shows(alone):
+                    measurement.slow.add(k)
+                    torque = f"the torque of {measurement.joint(k)}"
+                    yield self._of(measurement, order, most, alone, torque, "which improves")
+
+    def _of(
+        self,
+        measurement: Measurement,
+        order: int,
+        period: int,
+        alike: dict[int, tuple[float, float]],
+        what: str,
+        gained: str,
+    ) -> Suspicion:
+        """A torque that has a new value every few rows."""
+        rate = float(f"{measurement.rate / period:.4g}")
+        way = "held" if order == 1 else "interpolated"
+        return self.suspicion(
+            f"{what} was {way} between the values of a slower bus, at about {rate:g} Hz",
+            f"every {period} rows it {'changes' if order == 1 else 'bends'} up to "
+            f"{max(times for _, times in alike.values()):.3g} times as much as in the rows "
+            f"between, {gained} the likelihood of these changes by "
+            f"{sum(gain for gain, _ in alike.values()):.0f}",
+            "suspected",
+            alike,
+            (f"--resample {rate:g}", f"resample_rate={rate:g}"),
+        )
 
 
-def _common_period(
+def _total(own: dict[int, tuple[float, float]]) -> float:
+    """What all joints gain together."""
+    return sum(max(gain, 0.0) for gain, _ in own.values())
+
+
+def _shows(alike: dict[int, tuple[float, float]]) -> bool:
+    """Whether joints gain enough by a period, and the sizes differ enough in it."""
+    return _total(alike) >= SURE and max(times for _, times in alike.values()) >= TIMES
+
+
+def _best(gains: list[tuple[int, float]]) -> int:
+    """The period that gains most, 0 if none does; multiples of it gain as much."""
+    most, best = 0.0, 0
+    for period, gain in gains:
+        if gain > max(1.1 * most, most + 5.0):
+            most, best = gain, period
+    return best
+
+
+def _periods(
     measurement: Measurement, order: int
-) -> tuple[int, dict[int, tuple[float, float]]] | None:
-    """Period that the differences of all torques gain most by, together.
+) -> list[tuple[int, dict[int, tuple[float, float]]]]:
+    """What the differences of the torque of every joint, from 0, gain by every period.
 
     The values of one bus come at the same time, so that joints with much noise need not show by
-    themselves what others show. Returned with the log-likelihood gain and the largest ratio of
-    sizes on every joint, from 0, that gains; joints that do not move and torques that never change
-    are left out.
+    themselves what others show. Every gain of log-likelihood is given with the largest ratio of
+    sizes; joints that do not move and torques that never change are left out.
     """
     s, spread = measurement.signals, np.std(measurement.torque, axis=0)
     joints = np.flatnonzero(measurement.excited & (spread > 0))
@@ -86,9 +124,9 @@ def _common_period(
     ]
     parts = [part - part.mean(axis=0) for part in parts]  # for squares without cancellation
     squares = [np.sum(part**2, axis=0) for part in parts]
+    found: list[tuple[int, dict[int, tuple[float, float]]]] = []
     if not len(joints) or max(map(len, parts), default=0) < 4 * FEWEST:
-        return None
-    most, found = 0.0, None
+        return found
     for period in PERIODS:
         sizes = [
             _sizes(part, square, period)
@@ -99,12 +137,10 @@ def _common_period(
             continue
         counts = np.array([n for _, n, _ in sizes])
         gains = sum(gain for _, _, gain in sizes) - 0.5 * np.log(counts.sum()) * (period - 1)
-        total = float(np.maximum(gains, 0.0).sum())
-        if total > max(1.1 * most, most + 5.0):  # multiples of it gain as much
-            logs = np.average([_from_largest(x) for x, _, _ in sizes], axis=0, weights=counts)
-            times = np.exp(np.ptp(logs, axis=0))
-            alike = zip(joints.tolist(), gains.tolist(), times.tolist(), strict=True)
-            most, found = total, (period, {k: (g, x) for k, g, x in alike if g > 0})
+        logs = np.average([_from_largest(x) for x, _, _ in sizes], axis=0, weights=counts)
+        times = np.exp(np.ptp(logs, axis=0))
+        both = zip(gains.tolist(), times.tolist(), strict=True)
+        found.append((period, dict(zip(joints.tolist(), both, strict=True))))
     return found
 
 

@@ -305,8 +305,8 @@ def _late_motion(measurement: Measurement, score: Score, found: Delay) -> LateMo
     if abs(moved.lag) < 2 * (SMALLEST_COARSE if coarse else SMALLEST):
         return None
     late = late_joints(found)
-    if moved.joint in late:
-        return None  # a joint that no other feels
+    if moved.joint in late or moved.joint in measurement.slow:
+        return None  # a joint that no other feels, or whose torque is late by itself
     if moved.gain > MOVED and moved.gain > LEAST + max(
         moved.own_gain, moved.common_gain, float(found.gains[late].sum())
     ):
@@ -411,5 +411,8 @@ def measured_delay(measurement: Measurement) -> Delay | None:
     if fits is None:
         return None
     if measurement.delay is None:
-        measurement.delay = find_delay(fits.loaded())
+        measurement.delay = found = find_delay(fits.loaded())
+        for k in measurement.slow:  # held and interpolated values are always late or early
+            found.joints[k] = found.errors[k] = np.nan
+            found.gains[k] = 0.0
     return measurement.delay

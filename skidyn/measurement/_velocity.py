@@ -11,6 +11,7 @@ import numpy as np
 
 from skidyn._signals import Array, Signals
 from skidyn.measurement._check import Check
+from skidyn.measurement._delay import find_delay
 from skidyn.measurement._lowpass import TRIED, summit, suspect_lowpass, without_lowpass
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._measures import velocity_consistency
@@ -18,6 +19,7 @@ from skidyn.measurement._peak import vertex
 from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion, remedy_of
 from skidyn.measurement._tachometer import Fault, find_fault
+from skidyn.measurement._torque import readable_fits
 from skidyn.measurement._units import (
     CLOCKS,
     LEAST,
@@ -48,6 +50,9 @@ SMALLEST, STEPS, TAKEN, AGREEING, NEARLY = 0.006, 1.2, 0.3, 0.75, 0.01
 #: Largest residual of a low pass to be reported, as a share of that of a delay; largest difference
 #: of a common time constant between joints.
 FILTERED, SAME_FILTER = 0.4, 0.15
+#: Largest lag of the torque, as a share of that of the position behind the velocity, of which the
+#: latter is the one that is early; number of standard errors that must be less than this lag.
+IN_TIME, ERRORS = 0.3, 5.0
 
 
 class Velocity(Check):
@@ -272,7 +277,8 @@ class VelocityDelay(Check):
 
     name = "velocity_delay"
     suspects = (
-        "velocities that are late relative to the positions: filtered, or stamped by another clock"
+        "velocities that are late or early relative to the positions: filtered, commanded, or "
+        "stamped by another clock"
     )
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -285,6 +291,18 @@ class VelocityDelay(Check):
         late, early = ("velocity", "position") if common > 0 else ("position", "velocity")
         column = "dq" if common > 0 else "q"
         value = float(f"{abs(_refined(measurement.signals, own)):.3g}")
+        if late == "position" and _in_time(measurement, value):
+            yield self.suspicion(
+                f"the velocity is early relative to the position by about {1e3 * value:g} ms, and "
+                "the torque is not",
+                f"at that lag it is the derivative of the position, equally in {len(own)} of "
+                f"{sum(map(np.isfinite, lags.values()))} moving joints, but bodies, friction and "
+                "rotor inertia explain the torque best at the time of the position: the velocity "
+                "was commanded or predicted, not measured",
+                "suspected",
+                remedy=remedy_of("derive", ["dq"]),
+            )
+            return
         measurement.late_position = value if late == "position" else 0.0
         constant = _lowpass(measurement.signals, own)
         if constant is not None:
@@ -333,6 +351,15 @@ class VelocityDelay(Check):
                 [k],
                 remedy_of("late", {column: value}),
             )
+
+
+def _in_time(measurement: Measurement, late: float) -> bool:
+    """Whether the torque is in time with positions that are late relative to the velocity."""
+    fits = readable_fits(measurement)
+    if fits is None or measurement.stale:
+        return False
+    delay = find_delay(fits.loaded())
+    return bool(abs(delay.common) < IN_TIME * late and ERRORS * delay.error < late)
 
 
 def _lags(measurement: Measurement) -> dict[int, float]:

@@ -127,3 +127,14 @@ def test_a_rest_at_zero_with_a_flickering_last_digit(signals, torque):
     flicker = np.random.default_rng(0).integers(-1, 2, signals.dq.shape) * 0.005
     velocity = np.where(rest, flicker, signals.dq)
     assert told_of_reads(signals.with_(dq=velocity), torque) == []
+
+
+def test_a_joint_at_rest_whose_position_changes_by_a_step_now_and_then(signals, torque):
+    """Its velocity jumps by as much in both directions, and no value is missing."""
+    q, dq = signals.q.copy(), signals.dq.copy()
+    q[:, 0] = 0.3
+    q[np.random.default_rng(2).choice(len(q) - 10, 40, replace=False) + 5, 0] += 2.4e-5
+    dq[:, 0] = np.gradient(q[:, 0], 0.01).round(4)
+    rounding = np.random.default_rng(3).choice([-1e-15, 0.0, 1e-15], len(q))
+    dq[:, 0] = np.where(dq[:, 0] == 0, rounding, dq[:, 0])
+    assert told_of_reads(signals.with_(q=q, dq=dq), torque) == []

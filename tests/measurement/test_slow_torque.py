@@ -49,6 +49,19 @@ def test_torque_between_the_values_of_a_slower_bus_is_told_alone(change, way):
     assert float(one.remedy.option.split()[1]) == pytest.approx(rate, rel=0.05)
 
 
+@pytest.mark.parametrize("step", [0.0, 0.125])
+def test_torque_of_one_joint_from_a_slower_bus_is_told_alone(step):
+    """Also in coarse steps, of which many follow each other anyway; it is no delay."""
+    frame = make_hidden_effect_log(load_ur5(), None, n_trajectories=5, random_state=4).frame
+    for _, own in frame.groupby("trajectory"):
+        x = own["tau2"].to_numpy()
+        x = np.round(x / step) * step if step else x
+        frame.loc[own.index, "tau2"] = x[np.arange(len(x)) // 6 * 6]
+    told = [s for s in check_log(frame, load_ur5()).checks if s.certainty != "noted"]
+    assert [s.joints for s in told] == [(2,)]
+    assert told[0].check in ("held_torque", "slow_torque")
+
+
 def test_torque_that_was_measured_in_every_row():
     assert told_of() == {}
 

@@ -22,6 +22,17 @@ def test_late_velocities(signals, torque, found, only):
     only(found(signals.with_(dq=late), torque), "velocity_delay", "suspected", "--late dq=0.03")
 
 
+def test_commanded_velocities_are_early(recorded, told_of):
+    """The torque is in time with the position, so that this one is not late."""
+    frame = recorded.frame.copy()
+    for rows in frame.groupby("trajectory").groups.values():
+        time, values = frame.loc[rows, "time"], frame.loc[rows, ["dq1", "dq2"]].to_numpy()
+        early = [np.interp(time + 0.05, time, own) for own in values.T]
+        frame.loc[rows, ["dq1", "dq2"]] = np.stack(early, axis=1)
+    told = told_of(frame)["velocity_delay"]
+    assert told.remedy.option == "--derive dq" and "the torque is not" in told.suspicion
+
+
 def test_joined_recordings_are_told_once_and_cut_for_other_checks(signals, torque, found, only):
     kept = np.r_[0:700, 1250:2000]
     joined = signals.take(kept).with_(time=signals.time[: len(kept)])
