@@ -123,7 +123,10 @@ def conclude(
             [_mean_error(c), entry["rmse"], average]
             for c, entry, average in zip(comparisons, history, averages, strict=True)
         ]
-        noise = sensor_noise(problem.signals, residual), position_noise(problem, result.fit)
+        noise = (
+            sensor_noise(problem.signals, residual, problem.measured),
+            position_noise(problem, result.fit),
+        )
         needless = useless(problem, result, errors, noise, settings.least_drop)
         if needless is not None and all(
             h is not needless[0] for h in [*tried_last, result.findings[-1]]

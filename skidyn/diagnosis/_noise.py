@@ -5,7 +5,8 @@ The noise of the torque is the part that changes faster than any motion. Third d
 residual remove everything that is smooth over four samples, such as torques that depend on the
 motion, and leave the sensor's noise. Their median magnitude is used, which few disturbed samples do
 not affect. Noise that is correlated over several samples is not included: the value is a lower
-bound, and the remainder is compared with a multiple of it.
+bound, and the remainder is compared with a multiple of it. A torque in coarse steps hardly changes
+from sample to sample; its noise is at least the error of rounding to these steps.
 """
 
 from __future__ import annotations
@@ -13,12 +14,15 @@ from __future__ import annotations
 import numpy as np
 
 from skidyn._signals import Array, Signals
-from skidyn.measurement import position_step
+from skidyn.measurement import channel_step, position_step
 
 #: Variance of the third difference of white noise of unit variance: 1 + 9 + 9 + 1.
 GAIN = 20.0
 #: Median of the absolute value of a normal variable.
 MEDIAN = 0.6744897501960817
+#: Samples in which steps of a torque are looked for, and how many of them there are at least for
+#: every value of a torque in coarse steps.
+LOOKED_AT, RECUR = 20_000, 10
 
 
 def as_measured(logged: Signals, smooth: Signals, q: Array, *, shifted: bool) -> Array:
@@ -51,7 +55,7 @@ def as_measured(logged: Signals, smooth: Signals, q: Array, *, shifted: bool) ->
     return np.asarray(q + noise)
 
 
-def sensor_noise(signals: Signals, residual: Array) -> Array:
+def sensor_noise(signals: Signals, residual: Array, torque: Array | None) -> Array:
     """Standard deviation of the torque sensor's fast noise.
 
     Parameters
@@ -60,11 +64,13 @@ def sensor_noise(signals: Signals, residual: Array) -> Array:
         Motion, with its segments.
     residual : ndarray of shape (n_samples, n_joints), N m or N
         Residual of a model.
+    torque : ndarray of shape (n_samples, n_joints) or None, N m or N
+        Measured torque, which may come in steps.
 
     Returns
     -------
     ndarray of shape (n_joints,), N m or N
-        0 if a torque is constant or has repeated values; NaN with fewer than four samples in a row.
+        0 if a torque is constant; NaN with fewer than four samples in a row.
     """
     parts = [
         np.diff(residual[rows], n=3, axis=0)
@@ -74,4 +80,15 @@ def sensor_noise(signals: Signals, residual: Array) -> Array:
     if not parts:
         return np.full(residual.shape[1], np.nan)
     size: Array = np.median(np.abs(np.concatenate(parts)), axis=0) / MEDIAN / np.sqrt(GAIN)
-    return size
+    if torque is None:
+        return size
+    looked_at = torque[:: max(1, len(torque) // LOOKED_AT)]
+    return np.asarray(np.maximum(size, [_rounding(channel) for channel in looked_at.T]))
+
+
+def _rounding(channel: Array) -> float:
+    """Standard deviation of the error of rounding to coarse steps; 0 where they are not visible."""
+    if len(channel) < RECUR * len(np.unique(channel)):
+        return 0.0
+    step = channel_step(channel)
+    return step / float(np.sqrt(12.0)) if np.isfinite(step) else 0.0

@@ -178,7 +178,7 @@ def noise_level(problem: Problem, residual: Array) -> Array:
     -------
     ndarray of shape (n_joints,), N m or N
     """
-    sensor = np.nan_to_num(sensor_noise(problem.signals, residual))
+    sensor = np.nan_to_num(sensor_noise(problem.signals, residual, problem.measured))
     return np.asarray(np.hypot(sensor, position_noise(problem)))
 
 

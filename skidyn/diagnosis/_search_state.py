@@ -230,7 +230,7 @@ class SearchState:
         if not self.weighs_positions or problem.robot is None or problem.of_residual:
             return set()
         residual = self.residual
-        sensor = np.nan_to_num(sensor_noise(problem.signals, residual))
+        sensor = np.nan_to_num(sensor_noise(problem.signals, residual, problem.measured))
         return set(np.flatnonzero(2 * position_noise(problem, self.fit) ** 2 > sensor**2).tolist())
 
     def imitation(self) -> Tester:

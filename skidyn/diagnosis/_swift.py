@@ -57,7 +57,7 @@ def look_at_swift(
     if not family or not clocked or problem.signals.rate * SHORT_WINDOW < FEWEST_SAMPLES:
         return problem, result
     residual = problem.torque - problem.explained(result.fit)
-    sensor = np.nan_to_num(sensor_noise(problem.signals, residual))
+    sensor = np.nan_to_num(sensor_noise(problem.signals, residual, problem.measured))
     if np.any(position_noise(problem, result.fit) > sensor):  # coarse positions
         family = [k for k in family if not get_effect(k).follows_acceleration]
     if not family:

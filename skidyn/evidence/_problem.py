@@ -56,6 +56,8 @@ class Problem:
         Whether rigid-body parameters are identified together with the effects.
     logged : Signals or None
         Logged motion.
+    measured : ndarray of shape (n_samples, n_joints) or None, N m or N
+        Torque as given, from which nothing was subtracted.
     of_residual : bool
         Whether the torque is the residual of a regressor, and not that of the robot.
     last : LastResults
@@ -74,6 +76,7 @@ class Problem:
     rigid_index: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     rigid_rows: list[Array] = field(default_factory=list)
     logged: Signals | None = None
+    measured: Array | None = None
     of_residual: bool = False
     _cache: dict[Term, dict[int, Array]] = field(default_factory=dict, repr=False)
     last: LastResults = field(default_factory=LastResults, repr=False)
@@ -454,7 +457,8 @@ def make_problem(
         whole,
         rigid_body and robot is not None,
     )
-    problem.logged, problem.of_residual = signals, not subtract_urdf
+    problem.logged, problem.measured = signals, torque
+    problem.of_residual = not subtract_urdf
     problem.rigid_rows = [np.zeros((n, 0)) for n in rows.counts]
     if subtract_urdf and robot is not None:
         s = problem.signals

@@ -38,7 +38,11 @@ class Acceleration(Check):
         slopes = {}
         for k, (of_velocity, likeness) in enumerate(measurement.velocities):
             right = abs(of_velocity - 1) < NEAR and likeness > ALIKE
-            if not measurement.excited[k] or not right or not s.ddq[:, k].any():
+            if not measurement.excited[k] or not right:
+                continue
+            if np.ptp(s.ddq[:, k]) == 0:
+                groups.setdefault("constant", []).append(k)
+                slopes[k] = 0.0, 0.0
                 continue
             slope, alike = velocity_consistency(s.clock, s.dq[:, k], s.ddq[:, k], s.segments)
             cause = _cause(slope, alike)
@@ -63,7 +67,9 @@ class Acceleration(Check):
             "positions"
         )
         what, remedy = f"the acceleration of {names} is not the derivative of the velocity", None
-        if cause == "sign":
+        if cause == "constant":
+            what = f"the acceleration of {names} never changes, although the velocity does"
+        elif cause == "sign":
             columns = [f"ddq{k + 1}" for k in joints]
             what = f"the acceleration of {names} has the opposite sign"
             remedy = remedy_of("flip", columns)

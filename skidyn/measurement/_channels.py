@@ -12,7 +12,7 @@ from skidyn.evidence import broken_notes
 from skidyn.measurement._around_zero import dead_bands
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import COARSE, is_short, step_of_values
+from skidyn.measurement._measures import COARSE, FEW_VALUES, channel_step, is_short
 from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Share of rows at the extreme torque from which it is reported.
@@ -20,10 +20,12 @@ CLIPPED = 0.002
 #: Fourth differences of a torque relative to its spread above which it has noise; joints of
 #: recordings with noise are never below 4e-4.
 NOISELESS, ENOUGH = 1e-5, 200
-#: Most values of a torque that is coarse in any case; step of a torque, as a share of its spread,
-#: that is reported, and that is suspected; how many times as often as the value next to it an
-#: extreme value of a coarse torque occurs if it is clipped.
-FEW_VALUES, NOTED_STEP, LARGE_STEP, OFTENER = 64, 0.2, 0.5, 3.0
+#: Step of a velocity or torque, as a share of its spread, that is reported, and that of a torque
+#: that is suspected; how many times as often as the value next to it an extreme value of a coarse
+#: torque occurs if it is clipped.
+NOTED_STEP, LARGE_STEP, OFTENER = 0.2, 0.5, 3.0
+#: How many times as large a step of a velocity must be as that of differences of the positions.
+COARSER = 2.0
 
 
 class StillJoint(Check):
@@ -71,6 +73,32 @@ class CoarsePosition(Check):
                 "accelerations and small effects that depend on them are less certain",
                 "noted",
                 sorted(coarse),
+            )
+
+
+class CoarseVelocity(Check):
+    """Velocities in steps that those of the positions do not explain."""
+
+    name = "coarse_velocity"
+    suspects = "velocities in coarse steps"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        s, told = measurement.signals, []
+        for k in np.flatnonzero(measurement.excited).tolist():
+            step, spread = measurement.velocity_steps[k], float(s.dq[:, k].std())
+            own = measurement.position_steps[k] * measurement.rate
+            if step > NOTED_STEP * spread > 0 and not step < COARSER * own:
+                told.append((k, step, step / spread))
+        if told:
+            joints = [k for k, _, _ in told]
+            yield self.suspicion(
+                f"the velocity of {measurement.joints(joints)} comes in coarse steps",
+                f"the steps are up to {max(step for _, step, _ in told):.3g} rad/s (m/s for a "
+                f"slider), {max(share for _, _, share in told):.0%} of the standard deviation; "
+                "differences of the positions are finer",
+                "noted",
+                joints,
+                remedy_of("derive", [f"dq{k + 1}" for k in joints]),
             )
 
 
@@ -147,14 +175,6 @@ class ClippedTorque(Check):
                 )
 
 
-def torque_step(torque: Array) -> float:
-    """Step of a torque with few values, or of a coarse sensor; NaN if it is not coarse."""
-    values = np.unique(torque)
-    if 2 < len(values) <= FEW_VALUES:
-        return float(np.median(np.diff(values)))
-    return step_of_values(values)
-
-
 def _is_coarse_extreme(torque: Array) -> bool:
     """Whether the extreme values of a coarse torque are no more frequent than their neighbours."""
     values, counts = np.unique(torque, return_counts=True)
@@ -187,7 +207,7 @@ def coarse_torques(measurement: Measurement) -> dict[int, tuple[float, float]]:
     found = {}
     for k in range(measurement.n_joints):
         torque = measurement.torque[:, k]
-        step, spread = torque_step(torque), float(torque.std())
+        step, spread = channel_step(torque), float(torque.std())
         if np.isfinite(step) and step > NOTED_STEP * spread > 0:
             found[k] = (step, step / spread)
     return found

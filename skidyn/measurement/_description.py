@@ -52,8 +52,7 @@ class DescriptionUnits(Check):
         found, told = _decided(measurement, robot, found)
         if not found:
             return
-        certain = bool(told) and not measurement.identified
-        certainty: Certainty = "certain" if certain else "suspected"
+        certainty: Certainty = "certain" if told else "suspected"
         for wrong in found:
             yield self.suspicion(
                 _suspicion(robot, wrong),

@@ -15,6 +15,7 @@ from skidyn._signals import Array, Signals, rates_of
 from skidyn._text import listed
 from skidyn.measurement._measures import (
     COARSE,
+    channel_step,
     excited,
     find_leaps,
     held_share,
@@ -273,7 +274,7 @@ class Measurement:
             return {}  # parts between leaps have no numbers of their own
         from skidyn.measurement._odd_motion import odd_motion
 
-        return odd_motion(self.whole, self.unwrapped)
+        return odd_motion(self.whole, self.unwrapped, self.velocity_steps)
 
     @cached_property
     def unwrapped(self) -> Array:
@@ -373,6 +374,11 @@ class Measurement:
         free = [k for k, share in shares.items() if share < HELD_BY_ONE / 2 and self.excited[k]]
         # if all hold, rows repeat, or the sensors are coarse
         return {k: x for k, x in shares.items() if x > HELD_BY_ONE and self.excited[k] and free}
+
+    @cached_property
+    def velocity_steps(self) -> list[float]:
+        """Steps of coarse velocities, rad/s or m/s, and NaN for others."""
+        return [channel_step(dq) for dq in self.signals.dq.T]
 
     @cached_property
     def position_steps(self) -> list[float]:

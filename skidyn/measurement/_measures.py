@@ -41,6 +41,8 @@ FEWEST_MISSING, JUMPS = 5, 0.4
 #: How many times as many zeros as torques one step beside zero are more than those of a coarse
 #: torque.
 MORE_ZEROS = 2.0
+#: Most values of a channel that is coarse in any case.
+FEW_VALUES = 64
 #: Fewest values of a torque that is not coarse.
 FINE = 50
 #: Most steps that a position may be held before it catches up, and the share of the distance that
@@ -73,6 +75,14 @@ def step_of_values(position: np.ndarray) -> float:
     multiples = gaps[gaps < 20 * step] / step
     whole = np.abs(multiples - np.round(multiples)) < 0.1
     return step if whole.mean() > 0.9 else np.nan
+
+
+def channel_step(values: np.ndarray) -> float:
+    """Step of a channel with few values, or of a coarse sensor; NaN if it is not coarse."""
+    distinct = np.unique(values)
+    if 2 < len(distinct) <= FEW_VALUES:
+        return float(np.median(np.diff(distinct)))
+    return step_of_values(distinct)
 
 
 def is_repeated(position: np.ndarray, velocity: np.ndarray, trajectory: np.ndarray) -> np.ndarray:

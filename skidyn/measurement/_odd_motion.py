@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -22,6 +22,8 @@ SCALED, UNLIKE, USUALLY = 0.9, 0.5, 0.98
 FAR, NEAR, FEWEST, MOST = 0.25, 0.1, 3, 0.6
 #: Way of a joint in a recording, as a share of that in the others, from which it is compared.
 MOVED = 0.25
+#: Steps of a coarse velocity that a recording must reach to be compared.
+RESOLVED = 6.0
 #: How nearly joints share a slope.
 SHARED = 0.05
 #: Spread of a velocity, and its way through a recording whose position is stuck, in rad or m.
@@ -66,7 +68,9 @@ class OddMotion(Check):
             )
 
 
-def odd_motion(signals: Signals, position: Array) -> dict[int, dict[int, float]]:
+def odd_motion(
+    signals: Signals, position: Array, steps: Sequence[float]
+) -> dict[int, dict[int, float]]:
     """Slopes of integrated velocity on position in recordings in which it is not the usual one.
 
     Parameters
@@ -75,6 +79,8 @@ def odd_motion(signals: Signals, position: Array) -> dict[int, dict[int, float]]
         Recorded motion.
     position : ndarray of shape (n_samples, n_joints)
         Positions without leaps by a turn.
+    steps : sequence of float
+        Steps of coarse velocities, NaN for others.
 
     Returns
     -------
@@ -90,14 +96,15 @@ def odd_motion(signals: Signals, position: Array) -> dict[int, dict[int, float]]
         number = signals.trajectory
         parts = [rows for rows in signals.segments if number[rows.start] == run]
         for k in range(n):
-            dq = signals.dq[:, k]
+            dq, own = signals.dq[:, k], signals.dq[number == run, k]
             slopes[r, k], likeness[r, k] = velocity_consistency(
                 signals.clock, position[:, k], dq, parts
             )
-            way[r, k] = np.ptp(position[number == run, k])
+            if not np.ptp(own) < RESOLVED * steps[k]:
+                way[r, k] = np.ptp(position[number == run, k])
     found: dict[int, dict[int, float]] = {}
-    for k in range(n):
-        moves = way[:, k] > MOVED * np.median(way[:, k])
+    for k in np.flatnonzero(np.isfinite(way).any(axis=0)).tolist():
+        moves = way[:, k] > MOVED * np.nanmedian(way[:, k])
         scaled = moves & (np.abs(likeness[:, k]) > SCALED)
         if scaled.sum() <= FEWEST:
             continue

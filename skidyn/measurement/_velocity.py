@@ -40,6 +40,8 @@ STUCK = 10
 MOVING, MOST_MOVE = 0.05, 0.5
 #: Correlation of a velocity with the rate of its position above which it has no fault.
 SURE = 0.995
+#: How much smaller a coarse velocity may be whose digits were cut, in steps over its spread.
+CUT = 0.5
 #: Windows over which velocities are compared with positions, at most.
 WINDOWS = 3000
 #: Lags of the velocity that are tried, s, and how many times as long ones if none of them is best;
@@ -107,7 +109,7 @@ class Velocity(Check):
             if fault is not None:
                 faults.append(self._faulty(measurement, k, fault))
                 continue
-            if abs(slope - 1) < NEAR:
+            if abs(slope - 1) < max(NEAR, CUT * _coarseness(measurement, k)):
                 continue
             if k in measurement.millimetres:
                 continue
@@ -227,6 +229,12 @@ def _constant(measurement: Measurement) -> list[int]:
     return [int(k) for k in np.flatnonzero((still & turns) | (stands & moves))]
 
 
+def _coarseness(measurement: Measurement, k: int) -> float:
+    """Step of a coarse velocity, as a share of its spread; 0 if it is not coarse."""
+    step, spread = measurement.velocity_steps[k], float(measurement.signals.dq[:, k].std())
+    return step / spread if np.isfinite(step) and spread else 0.0
+
+
 def _of_units(slope: float) -> bool:
     """Whether a common slope of all joints is reported as a unit of the clock or of positions."""
     return any(is_near(slope, factor) for factor in (*CLOCKS, *POSITIONS))
@@ -337,6 +345,17 @@ class VelocityDelay(Check):
             value = float(f"{abs(_refined(measurement.signals, {k: lags[k]})):.3g}")
             late, early = ("velocity", "position") if lags[k] > 0 else ("position", "velocity")
             column = f"dq{k + 1}" if lags[k] > 0 else f"q{k + 1}"
+            if late == "position" and _in_time(measurement, value, k):
+                yield self.suspicion(
+                    f"the velocity of {measurement.joint(k)} is early relative to its position by "
+                    f"about {1e3 * value:g} ms, and its torque is not",
+                    "at that lag it is the derivative of the position, but the torque is in time "
+                    "with the position: the velocity was commanded or predicted, not measured",
+                    "suspected",
+                    [k],
+                    remedy_of("derive", [f"dq{k + 1}"]),
+                )
+                continue
             constant = _lowpass(measurement.signals, {k: lags[k]})
             if constant is not None:
                 what = f"the {late} of {measurement.joint(k)}"
@@ -353,13 +372,19 @@ class VelocityDelay(Check):
             )
 
 
-def _in_time(measurement: Measurement, late: float) -> bool:
-    """Whether the torque is in time with positions that are late relative to the velocity."""
+def _in_time(measurement: Measurement, late: float, joint: int | None = None) -> bool:
+    """Whether the torque is in time with positions that are late relative to the velocity.
+
+    Of all joints, or of one, from 0.
+    """
     fits = readable_fits(measurement)
     if fits is None or measurement.stale:
         return False
     delay = find_delay(fits.loaded())
-    return bool(abs(delay.common) < IN_TIME * late and ERRORS * delay.error < late)
+    lag, error = delay.common, delay.error
+    if joint is not None:
+        lag, error = delay.joints[joint], delay.errors[joint]
+    return bool(abs(lag) < IN_TIME * late and ERRORS * error < late)
 
 
 def _lags(measurement: Measurement) -> dict[int, float]:

@@ -3,6 +3,10 @@
 
 import numpy as np
 
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
+
 
 def test_it_is_that_of_the_simulated_sensor(spring_log, missing):
     ratio = missing.sensor_noise / spring_log.noise_std
@@ -14,3 +18,13 @@ def test_a_missing_effect_does_not_raise_it(spring_log, missing, complete_log, c
     with_effect = missing.sensor_noise / spring_log.noise_std
     without = complete.sensor_noise / complete_log.noise_std
     np.testing.assert_allclose(with_effect, without, rtol=0.1)
+
+
+def test_it_contains_the_rounding_of_a_coarse_torque():
+    """From sample to sample such a torque hardly changes."""
+    robot = load_planar_arm()
+    log = make_hidden_effect_log(robot, None, noise="low", random_state=5)
+    step = np.array([0.25, 0.3]) * log.y.std(axis=0)
+    found = diagnose(RBDRegressor(robot), log.X, np.round(log.y / step) * step)
+    np.testing.assert_allclose(found.sensor_noise, step / np.sqrt(12), rtol=0.3)
+    assert found.verdict == "complete" and not np.any(found.remainder > 2 * found.sensor_noise)

@@ -41,6 +41,11 @@ def test_sign_unit_and_scale(change, joints, remedy, frame, arm):
     assert (one.remedy and one.remedy.option) == remedy
 
 
+def test_a_column_of_zeros_beside_logged_accelerations(frame, arm):
+    (one,) = told(frame.assign(ddq2=0.0), arm)
+    assert one.joints == (2,) and "never changes" in one.suspicion
+
+
 def test_the_remedies_give_back_the_accelerations(frame, arm, tmp_path):
     from skidyn.logs import read_log
 

@@ -28,6 +28,15 @@ def test_torque_in_coarse_steps(signals, torque, found):
     assert "clipped_torque" not in told
 
 
+def test_velocities_in_coarse_steps(signals, torque, found):
+    step = 0.3 * signals.dq[:, 0].std()
+    coarse = signals.dq.copy()
+    coarse[:, 0] = np.trunc(coarse[:, 0] / step) * step
+    told = {s.check: s for s in found(signals.with_(dq=coarse), torque)}
+    assert told["coarse_velocity"].remedy.option == "--derive dq1"
+    assert told["coarse_velocity"].certainty == "noted"
+
+
 def test_torque_without_noise(arm, signals, found):
     smooth = arm.inverse_dynamics(signals.q, signals.dq, signals.ddq) + 0.8 * signals.dq
     assert "smooth_torque" in [s.check for s in found(signals, smooth, None)]

@@ -58,3 +58,13 @@ def test_what_differs_in_most_recordings_is_not_of_single_ones():
     some = frame["trajectory"].isin(frame["trajectory"].unique()[:3])
     frame.loc[some, "dq2"] *= -1
     assert "odd_motion" not in {s.check for s in check_log(frame, ROBOT).checks}
+
+
+def test_a_slow_recording_whose_velocity_is_cut_to_few_digits():
+    """Nearly all of its velocities are zero, but those of the others are right."""
+    frame = FRAME.copy()
+    frame.loc[OWN, ["q2", "dq2"]] *= 0.4
+    step = 0.395 * frame.loc[~OWN, "dq2"].abs().max()
+    step = min(step, 0.99 * frame.loc[OWN, "dq2"].abs().max())
+    frame["dq2"] = np.trunc(frame["dq2"] / step) * step
+    assert "odd_motion" not in {s.check for s in check_log(frame, ROBOT).checks}

@@ -33,6 +33,15 @@ def test_commanded_velocities_are_early(recorded, told_of):
     assert told.remedy.option == "--derive dq" and "the torque is not" in told.suspicion
 
 
+def test_the_commanded_velocity_of_one_joint(recorded, told_of):
+    frame = recorded.frame.copy()
+    for rows in frame.groupby("trajectory").groups.values():
+        time, values = frame.loc[rows, "time"], frame.loc[rows, "dq2"]
+        frame.loc[rows, "dq2"] = np.interp(time + 0.05, time, values)
+    told = told_of(frame)["velocity_delay"]
+    assert told.joints == (2,) and told.remedy.option == "--derive dq2"
+
+
 def test_joined_recordings_are_told_once_and_cut_for_other_checks(signals, torque, found, only):
     kept = np.r_[0:700, 1250:2000]
     joined = signals.take(kept).with_(time=signals.time[: len(kept)])
