@@ -57,12 +57,14 @@ def leaps(
                 least[end : end + WIDTH // 2] = 1.0
     broken = np.zeros(values.shape, dtype=bool)
     coarse = None
+    # One that rests for most of a recording has a small range there.
+    whole = np.diff(np.quantile(values, TAILS, axis=0), axis=0)
     for name in np.unique(signals.trajectory):
         own = signals.trajectory == name
         bottom, top = np.quantile(values[own], TAILS, axis=0)
         distance = np.abs(away[own])
         # Strictly above: a constant signal has no range and no jumps.
-        far = distance > least[own] * (top - bottom)
+        far = distance > np.where(least[own] < 1.0, least[own] * (top - bottom), whole)
         if not far.any():
             continue
         coarse = STEPS * _smallest_change(values) if coarse is None else coarse

@@ -23,7 +23,7 @@ NOISELESS, ENOUGH = 1e-5, 200
 #: Step of a velocity or torque, as a share of its spread, that is reported, and that of a torque
 #: that is suspected; how many times as often as the value next to it an extreme value of a coarse
 #: torque occurs if it is clipped.
-NOTED_STEP, LARGE_STEP, OFTENER = 0.2, 0.5, 3.0
+NOTED_STEP, LARGE_STEP, OFTENER = 0.1, 0.5, 3.0
 #: How many times as large a step of a velocity must be as that of differences of the positions.
 COARSER = 2.0
 

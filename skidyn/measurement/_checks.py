@@ -45,6 +45,7 @@ from skidyn.measurement._held import (
     HeldTorque,
     HeldVelocity,
     MissingTorque,
+    StuckPosition,
     StuckTorque,
 )
 from skidyn.measurement._joint_gravity import JointGravity
@@ -75,6 +76,7 @@ CHECKS: tuple[Check, ...] = (
     OddMotion(),
     JoinedRecordings(),
     HeldPosition(),
+    StuckPosition(),
     RepeatedRows(),
     RepeatedRecordings(),
     FalseGaps(),

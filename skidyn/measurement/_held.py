@@ -19,6 +19,7 @@ from skidyn.measurement._measures import (
     is_held,
     step_of_values,
 )
+from skidyn.measurement._odd_motion import LEAST_SPEED, LEAST_SWEPT
 from skidyn.measurement._placeholder import placeholder_remedy
 from skidyn.measurement._suspicion import Suspicion, remedy_of
 
@@ -191,6 +192,43 @@ class HeldPosition(Check):
                 [k],
                 (f"--resample {rate:g}", f"resample_rate={rate:g}"),
             )
+
+
+class StuckPosition(Check):
+    """A position that does not change in a part of a recording, although its velocity does."""
+
+    name = "stuck_position"
+    suspects = "positions that do not change in a part of a recording although the joint moves"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        s = measurement.signals
+        if measurement.lost or measurement.clock != 1:
+            return
+        known = measurement.stuck
+        for k in np.flatnonzero(measurement.excited).tolist():
+            for a, b in _still_parts(s.q[:, k], s.trajectory):
+                run, speed = int(s.trajectory[a]), s.dq[a:b, k]
+                way = np.cumsum(speed[1:] * np.diff(s.clock[a:b]))  # noise cancels
+                if np.ptp(way) < LEAST_SWEPT or speed.std() < LEAST_SPEED:
+                    continue
+                if run in known.get(k, ()) or b in measurement.leaps:
+                    continue  # reported for the whole recording, or with the jump after it
+                yield self.suspicion(
+                    f"the position of {measurement.joint(k)} is stuck in a part of trajectory "
+                    f"{int(measurement.recorded.trajectory[a])}",
+                    f"from {s.clock[a]:.4g} s to {s.clock[b - 1]:.4g} s it is {s.q[a, k]:.4g} "
+                    f"although the velocity reaches {np.abs(speed).max():.3g}; leave this part out",
+                    "certain",
+                    [k],
+                )
+
+
+def _still_parts(position: Array, trajectory: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """First rows of long parts of recordings without any change, and those after them."""
+    new = np.r_[True, (position[1:] != position[:-1]) | (trajectory[1:] != trajectory[:-1])]
+    begins = np.flatnonzero(new)
+    ends = np.append(begins[1:], len(position))
+    return [(int(a), int(b)) for a, b in zip(begins, ends, strict=True) if b - a >= LONG]
 
 
 class MissingTorque(Check):

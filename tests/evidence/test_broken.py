@@ -47,6 +47,13 @@ def test_a_signal_at_rest_has_no_leaps():
     assert broken_notes(signals, np.zeros_like(signals.q), ("elbow",)) == []
 
 
+def test_a_recording_that_begins_with_motion_and_rests_has_no_leaps():
+    signals = swing()
+    q = signals.q.copy()
+    q[1000:] = 0.3 - 0.03 * np.exp(-np.arange(1000) / 5.0)[:, None]
+    assert broken_notes(signals.with_(q=q), np.zeros((2000, 1)), ("joint",)) == []
+
+
 def test_the_note_names_joint_row_and_value():
     signals = swing()
     torque = friction(signals)

@@ -18,6 +18,13 @@ def test_a_position_that_is_reported_less_often(signals, torque, found):
     assert "lost_rows" not in told
 
 
+def test_a_position_that_is_stuck_for_a_while(signals, torque, found):
+    stuck = signals.q.copy()
+    stuck[700:900, 0] = stuck[700, 0]
+    told = [s for s in found(signals.with_(q=stuck), torque) if s.certainty == "certain"]
+    assert [s.joints for s in told] == [(1,)] and "stuck" in told[0].suspicion
+
+
 def test_a_torque_that_is_stuck_for_a_while(signals, torque, found):
     stuck = torque.copy()
     stuck[700:900, 0] = stuck[700, 0]
