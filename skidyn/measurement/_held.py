@@ -25,6 +25,8 @@ from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Least share of rows with the torque of the previous row, for a torque that is not coarse.
 HELD = 0.3
+#: Share of the changes of a held value that are a multiple of its period apart.
+REGULAR = 0.9
 #: Least length of a stuck part in rows, and as a multiple of the longest other part of one value;
 #: most stuck parts of a joint; least motion in it, as a share of the range of the joint.
 LONG, LONGER, MOST_STUCK, STUCK_WAY = 40, 5, 8, 0.1
@@ -60,7 +62,8 @@ class HeldTorque(Check):
             torque = measurement.torque[:, k]
             valued = moved & (torque[1:] != 0)  # zeros follow each other in a dead band
             share = np.mean(torque[1:][valued] == torque[:-1][valued]) if valued.any() else 0.0
-            if k not in lost and share > HELD and not _comes_in_steps(torque):
+            steps = _comes_in_steps(torque) and not _in_rhythm(torque, s.trajectory)
+            if k not in lost and share > HELD and not steps:
                 shares[k] = share
         held = np.flatnonzero(shares)
         if len(held):
@@ -85,6 +88,17 @@ def _comes_in_steps(values: Array) -> bool:
     if np.isfinite(step) and np.median(changes) < CATCHES * step:
         return True
     return len(distinct) < RECURS * len(changes)
+
+
+def _in_rhythm(values: Array, trajectory: NDArray[np.int64]) -> bool:
+    """Whether values change in every n-th row only, as those of a slower bus."""
+    changes = np.flatnonzero((values[1:] != values[:-1]) & (trajectory[1:] == trajectory[:-1]))
+    if len(changes) < LONG:
+        return False
+    apart, times = np.unique(np.diff(changes), return_counts=True)
+    usual = int(apart[np.argmax(times)])
+    # where two values are equal by chance, it takes two periods
+    return usual > 1 and bool(times[apart % usual == 0].sum() > REGULAR * times.sum())
 
 
 def _accelerates(position: Array) -> NDArray[np.bool_]:
@@ -116,8 +130,10 @@ class HeldVelocity(Check):
             if not measurement.excited[k] or moved.sum() < 50:
                 continue
             share = float(np.mean(dq[1:][moved] == dq[:-1][moved]))
-            if share > HELD and not _comes_in_steps(dq):  # nor is it constant
+            steps = _comes_in_steps(dq) and not _in_rhythm(dq, s.trajectory)
+            if share > HELD and not steps:  # nor is it constant
                 shares[k] = share
+        measurement.held_velocities = set(shares)
         if shares:
             names = measurement.joints(shares)
             columns = [f"dq{k + 1}" for k in shares]

@@ -79,6 +79,8 @@ class Measurement:
         Joints, from 0, whose positions are reported to be in millimetres; set by their check.
     slow : set of int, optional
         Joints, from 0, whose torque alone is reported to come from a slower bus; set by its checks.
+    held_velocities : set of int, optional
+        Joints, from 0, whose velocity is reported to hold its last value; set by their check.
 
     Examples
     --------
@@ -117,6 +119,7 @@ class Measurement:
     clock: float = field(default=1.0, repr=False)
     millimetres: set[int] = field(default_factory=set, repr=False)
     slow: set[int] = field(default_factory=set, repr=False)
+    held_velocities: set[int] = field(default_factory=set, repr=False)
     #: The motion before trajectories were cut and gaps of the clock were closed.
     recorded: Signals = field(init=False, repr=False)
     #: Rows to which positions jump; trajectories end before them.

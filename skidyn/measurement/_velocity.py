@@ -394,7 +394,10 @@ def _lags(measurement: Measurement) -> dict[int, float]:
     return {
         k: _lag(measurement.signals, k)
         for k, (slope, likeness) in enumerate(measurement.velocities)
-        if measurement.excited[k] and likeness > 0.5 and slope > 0.5
+        if measurement.excited[k]
+        and likeness > 0.5
+        and slope > 0.5
+        and k not in measurement.held_velocities  # these are late by themselves
     }
 
 

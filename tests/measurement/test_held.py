@@ -25,6 +25,13 @@ def test_a_position_that_is_stuck_for_a_while(signals, torque, found):
     assert [s.joints for s in told] == [(1,)] and "stuck" in told[0].suspicion
 
 
+def test_a_velocity_of_a_slow_bus_in_few_digits(signals, torque, found):
+    slow = signals.dq.round(2)
+    slow[:, 1] = slow[np.arange(len(slow)) // 5 * 5, 1]
+    told = {s.check: s for s in found(signals.with_(dq=slow), torque)}
+    assert told["held_velocity"].joints == (2,)
+
+
 def test_a_torque_that_is_stuck_for_a_while(signals, torque, found):
     stuck = torque.copy()
     stuck[700:900, 0] = stuck[700, 0]
