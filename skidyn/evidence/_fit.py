@@ -16,6 +16,8 @@ from skidyn.evidence._folds import RIDGE, Normal
 LARGEST_RIDGE = 1e-6
 #: Directions weaker than this, relative to the strongest one, are due to rounding.
 RANK = 1e-7
+#: Residual, as a share of the torque, up to which it consists of rounding errors.
+EXACT = 1e-10
 #: Rows for each direction of the columns of a joint from which its residual determines its noise.
 ROWS_A_DIRECTION = 2.0
 
@@ -34,17 +36,24 @@ class Fit:
         Residual of the averaged rows of every joint, N m or N.
     sigma : ndarray of shape (n_joints,)
         Noise of one row of every joint, by which the rows were weighted.
+    rounding : ndarray of shape (n_joints,)
+        Root mean square of the rounding errors of a row.
     """
 
     terms: TermSum
     coefficients: Array
     residual: list[Array]
     sigma: Array
+    rounding: Array
 
     @property
     def noise(self) -> Array:
-        """Root mean square of the residual rows of every joint."""
-        return np.array([np.sqrt(np.mean(r**2)) + 1e-100 if len(r) else 1.0 for r in self.residual])
+        """Root mean square of the residual rows of every joint, at least that of rounding errors.
+
+        Rows of a joint that is explained exactly would otherwise outweigh those of all others.
+        """
+        own = [np.sqrt(np.mean(r**2)) + 1e-100 if len(r) else 1.0 for r in self.residual]
+        return np.maximum(own, self.rounding)
 
 
 @dataclass(frozen=True)
@@ -119,4 +128,6 @@ def fit_weighted(terms: TermSum, design: list[Array], target: list[Array], sigma
     scaled = normal.solution + normal.solve(unit.T @ (y - a @ (normal.solution / size)))
     coefficients = scaled / size
     residual = [t - block @ coefficients for block, t in zip(design, target, strict=True)]
-    return Fit(terms, coefficients, residual, np.asarray(sigma, dtype=float))
+    rounding = [EXACT * np.sqrt(np.mean(t**2)) if len(t) else 0.0 for t in target]
+    noise = np.asarray(sigma, dtype=float)
+    return Fit(terms, coefficients, residual, noise, np.array(rounding))
