@@ -176,9 +176,7 @@ def stuck_parts(measurement: Measurement, k: int) -> list[tuple[int, int]]:
     s, torque = measurement.signals, measurement.torque[:, k]
     if np.ptp(torque) == 0 or measurement.idle.any():
         return []
-    new = np.r_[True, (torque[1:] != torque[:-1]) | (s.trajectory[1:] != s.trajectory[:-1])]
-    begins = np.flatnonzero(new)
-    lengths = np.diff(np.append(begins, len(torque)))
+    begins, lengths = _equal_values(torque, s.trajectory)
     others = np.sort(lengths)[: max(len(lengths) - MOST_STUCK, 1)]
     long = np.flatnonzero(lengths >= max(LONG, LONGER * others[-1]))
     far = STUCK_WAY * float(np.ptp(s.q[:, k]))
@@ -222,7 +220,9 @@ class StuckPosition(Check):
             return
         known = measurement.stuck
         for k in np.flatnonzero(measurement.excited).tolist():
-            for a, b in _still_parts(s.q[:, k], s.trajectory):
+            begins, lengths = _equal_values(s.q[:, k], s.trajectory)
+            for i in np.flatnonzero(lengths >= LONG):
+                a, b = int(begins[i]), int(begins[i] + lengths[i])
                 run, speed = int(s.trajectory[a]), s.dq[a:b, k]
                 way = np.cumsum(speed[1:] * np.diff(s.clock[a:b]))  # noise cancels
                 if np.ptp(way) < LEAST_SWEPT or speed.std() < LEAST_SPEED:
@@ -239,12 +239,14 @@ class StuckPosition(Check):
                 )
 
 
-def _still_parts(position: Array, trajectory: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """First rows of long parts of recordings without any change, and those after them."""
-    new = np.r_[True, (position[1:] != position[:-1]) | (trajectory[1:] != trajectory[:-1])]
-    begins = np.flatnonzero(new)
-    ends = np.append(begins[1:], len(position))
-    return [(int(a), int(b)) for a, b in zip(begins, ends, strict=True) if b - a >= LONG]
+def _equal_values(
+    values: Array, trajectory: NDArray[np.int64]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First rows and lengths of the parts of recordings with one value."""
+    begins = np.flatnonzero(
+        np.r_[True, (values[1:] != values[:-1]) | (trajectory[1:] != trajectory[:-1])]
+    )
+    return begins, np.diff(np.append(begins, len(values)))
 
 
 class MissingTorque(Check):
