@@ -35,7 +35,7 @@ from skidyn.measurement._clock import (
 from skidyn.measurement._commanded import CommandedMotion
 from skidyn.measurement._copies import CopiedTorque, RepeatedRecordings
 from skidyn.measurement._crosstalk import Crosstalk
-from skidyn.measurement._description import DescriptionUnits
+from skidyn.measurement._description import DescriptionLengths, DescriptionUnits
 from skidyn.measurement._differential import MotorsOfDifferential
 from skidyn.measurement._divided import DividedRecordings
 from skidyn.measurement._elapsed import LostRows
@@ -67,6 +67,7 @@ UNSIGNED = UnsignedTorque()
 #: The only list of checks in skidyn.
 CHECKS: tuple[Check, ...] = (
     FailedReads(),
+    DescriptionLengths(),
     DescriptionUnits(),
     LostRows(),
     ClockUnit(),

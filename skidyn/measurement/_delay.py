@@ -30,6 +30,8 @@ NEAR = 2e-3
 FEWEST_OF_RUN = 15
 #: Largest difference of agreeing lags of joints in one recording, s.
 NEARLY = 0.008
+#: Log-likelihood from which a joint has a word in the lag of a recording.
+AGREED = 2.0
 #: Largest change of a lag, s, or twice its standard error.
 FAR = 1e-3
 #: Least velocity of rows that count, in rad/s (a tenth of it in m/s).
@@ -59,7 +61,7 @@ class RunDelay:
     usual : float, s
         Lag of the other recordings.
     joints : int
-        Number of joints whose own lag is close to it.
+        Number of joints whose own lag is close to it, with a word in it.
     """
 
     lag: float
@@ -301,7 +303,7 @@ def _of_runs(
             float(left),
             float(before),
             usual,
-            joints=int(np.sum(near & (gains > 0))),
+            joints=int(np.sum(near & (gains > AGREED))),
         )
     return found, beyond
 

@@ -31,11 +31,33 @@ from skidyn.robots import Robot
 
 #: Log-likelihood that other units must gain to be certain, and to be preferred to likelier ones.
 SURE, LEAST = 40.0, 15.0
+#: Reach of a robot, m, that is longer than that of any crane.
+LARGEST = 150.0
 #: Largest factor between torques and those of bodies whose masses are about right.
 USUAL = 2.5
 #: Number of links that are listed by name.
 LISTED = 6
 SI = {"mass": "kg", "center of mass": "m", "inertia": "kg m^2"}
+
+
+class DescriptionLengths(Check):
+    """Lengths of the description in millimetres."""
+
+    name = "description_lengths"
+    suspects = "lengths of the description in mm"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        robot = measurement.robot
+        if robot is None or (reach := shape_of(robot).reach) < LARGEST:
+            return
+        yield self.suspicion(
+            "the lengths of the description seem to be in mm instead of m",
+            f"from its base to its last link the robot would reach {reach:.3g} m. Divide the "
+            "origins of the joints by 1000, and the centers of mass if they are in mm, too; the "
+            "other checks do not use the description",
+            "certain",
+        )
+        measurement.robot = None
 
 
 class DescriptionUnits(Check):

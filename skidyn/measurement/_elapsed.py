@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array
+from skidyn._signals import Array, Signals
 from skidyn._text import trajectories_told
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
@@ -41,6 +41,9 @@ WHOLE = 0.25
 #: Steps from row to row, as shares of a joint's spread and of what velocities make of them, that
 #: rows in no order at all have.
 LARGE, FASTER = 0.05, 5.0
+#: Velocities against the others, as a share of the largest, of a velocity with one sign; way back,
+#: as a share of the way forth, of a joint that moves both ways.
+ONE_SIGN, BOTH_WAYS = 0.01, 0.05
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,7 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
     spread = s.q.std(axis=0)
     used = np.flatnonzero((spread > 1e-3) & (s.dq.std(axis=0) > 1e-3))
     used = np.setdiff1d(used, list(measurement.held))  # a held position catches up in one step
+    used = used[~_one_way(s, measurement.unwrapped)[used]]
     together = s.trajectory[1:] == s.trajectory[:-1]
     time = np.diff(s.clock)
     together &= time > 0
@@ -115,6 +119,15 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
         np.flatnonzero(together) + 1,
         square > FAST * np.mean(square),
     )
+
+
+def _one_way(signals: Signals, position: Array) -> NDArray[np.bool_]:
+    """Joints whose velocity has one sign although they move both ways: theirs is a speed."""
+    moved = np.diff(position, axis=0)[signals.trajectory[1:] == signals.trajectory[:-1]]
+    forth, back = np.maximum(moved, 0).sum(axis=0), np.maximum(-moved, 0).sum(axis=0)
+    small = ONE_SIGN * np.abs(signals.dq).max(axis=0)
+    one_sign = (signals.dq.min(axis=0) > -small) | (signals.dq.max(axis=0) < small)
+    return np.asarray(one_sign & (np.minimum(forth, back) > BOTH_WAYS * np.maximum(forth, back)))
 
 
 def _friction_work(measurement: Measurement, rows: NDArray[np.bool_]) -> float:

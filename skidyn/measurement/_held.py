@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array
+from skidyn._signals import Array, Signals
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import (
@@ -30,6 +30,8 @@ REGULAR = 0.9
 #: Least length of a stuck part in rows, and as a multiple of the longest other part of one value;
 #: most stuck parts of a joint; least motion in it, as a share of the range of the joint.
 LONG, LONGER, MOST_STUCK, STUCK_WAY = 40, 5, 8, 0.1
+#: Usual difference of the way of a position from that of its velocity, as a share of it, at most.
+FOLLOWING = 0.5
 
 
 class HeldTorque(Check):
@@ -221,6 +223,8 @@ class StuckPosition(Check):
         known = measurement.stuck
         for k in np.flatnonzero(measurement.excited).tolist():
             begins, lengths = _equal_values(s.q[:, k], s.trajectory)
+            if not _follows(s, k, np.repeat(lengths, lengths) >= LONG):
+                continue  # its velocity is another signal, which tells nothing about its position
             for i in np.flatnonzero(lengths >= LONG):
                 a, b = int(begins[i]), int(begins[i] + lengths[i])
                 run, speed = int(s.trajectory[a]), s.dq[a:b, k]
@@ -237,6 +241,19 @@ class StuckPosition(Check):
                     "certain",
                     [k],
                 )
+
+
+def _follows(signals: Signals, joint: int, stuck: NDArray[np.bool_]) -> bool:
+    """Whether a position follows its velocity from row to row where it is not stuck."""
+    q, dq = signals.q[:, joint], signals.dq[:, joint]
+    way = np.cumsum(np.r_[0.0, dq[1:] * np.diff(signals.clock)])
+    a = np.arange(len(q) - LONG // 2)
+    b = a + LONG // 2
+    inside = (signals.trajectory[a] == signals.trajectory[b]) & ~(stuck[a] | stuck[b])
+    moved, swept = (q[b] - q[a])[inside], (way[b] - way[a])[inside]
+    fast = np.abs(swept) > np.median(np.abs(swept)) if len(swept) else swept > 0
+    off = np.abs(moved - swept)[fast] / np.abs(swept[fast])
+    return bool(len(off) and np.median(off) < FOLLOWING)  # the median, since values may be missing
 
 
 def _equal_values(

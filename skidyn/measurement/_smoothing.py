@@ -30,7 +30,7 @@ from skidyn.measurement._torque_delay import measured_delay
 #: Standard deviations of the smoothing that are tried, s (where the last one is best, the torque is
 #: merely slow), and ways of presliding, rad (a tenth in
 #: metres).
-WIDTHS = 0.01 * 2.0 ** np.arange(6)
+WIDTHS = 0.01 * 2.0 ** np.arange(5)
 WAYS = np.array([0.001 * 2.0**k for k in range(8)])
 #: Speeds, rad/s (a tenth in m/s), below which friction fades or grows, and by how many times.
 SPEEDS, TIMES = 0.02 * 2.0 ** np.arange(5), (1.0, 3.0, 10.0)

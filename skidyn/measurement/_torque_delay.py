@@ -375,6 +375,8 @@ def late_runs(found: Delay) -> dict[int, RunDelay]:
         if abs(one.lag) > max(APART, ERRORS * one.error)
         and abs(one.usual + one.lag) > abs(one.usual)  # in time itself, it is not the odd one
         and one.gain > RUN_SURE
+        # friction of a single joint that moves alone may look late
+        and one.joints >= min(2, len(found.joints))
         and one.agreeing >= AGREEING
         and one.before > (TIMES if one.agreeing < ALL_AGREE else FEWER) * one.left
     }

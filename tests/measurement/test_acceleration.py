@@ -46,6 +46,20 @@ def test_a_column_of_zeros_beside_logged_accelerations(frame, arm):
     assert one.joints == (2,) and "never changes" in one.suspicion
 
 
+def test_accelerations_from_differences_of_past_velocities_are_late(frame, arm):
+    late = frame.copy()
+    for rows in frame.groupby("trajectory").groups.values():
+        dq, time = frame.loc[rows, ["dq1", "dq2"]].to_numpy(), frame.loc[rows, "time"].to_numpy()
+        before = np.maximum(np.arange(len(rows)) - 20, 0)
+        span = np.maximum(time - time[before], np.diff(time)[0])[:, None]
+        late.loc[rows, ["ddq1", "ddq2"]] = (dq - dq[before]) / span
+
+    (one,) = told(late, arm)
+
+    assert one.joints == (1, 2) and "is late by about" in one.suspicion
+    assert float(one.remedy.option.removeprefix("--late ddq=")) == pytest.approx(0.1, abs=0.015)
+
+
 def test_the_remedies_give_back_the_accelerations(frame, arm, tmp_path):
     from skidyn.logs import read_log
 

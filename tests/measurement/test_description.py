@@ -14,7 +14,7 @@ from skidyn.robots import Robot
 CHECK, TORQUES = "description_units", ("tau1", "tau2", "tau3")
 
 
-def arm(masses="4 3 2", centers="0.2 0.2 0.1", inertias="0.1 0.05 0.01"):
+def arm(masses="4 3 2", centers="0.2 0.2 0.1", inertias="0.1 0.05 0.01", length=0.4):
     """A description of three links of 0.4 m with other masses, centers of mass and inertias."""
     bodies = zip(masses.split(), centers.split(), inertias.split(), strict=True)
     text = "".join(
@@ -22,7 +22,7 @@ def arm(masses="4 3 2", centers="0.2 0.2 0.1", inertias="0.1 0.05 0.01"):
           <inertia ixx="{inertia}" iyy="{inertia}" izz="{inertia}" ixy="0" ixz="0" iyz="0"/>
           </inertial></link>
         <joint name="turn{k + 1}" type="revolute"><parent link="part{k}"/>
-          <child link="part{k + 1}"/><origin xyz="{0.4 * (k > 0)} 0 0"/><axis xyz="0 1 0"/>
+          <child link="part{k + 1}"/><origin xyz="{length * (k > 0)} 0 0"/><axis xyz="0 1 0"/>
           <limit lower="-3" upper="3" effort="1e5" velocity="9"/></joint>"""
         for k, (mass, center, inertia) in enumerate(bodies)
     )
@@ -119,3 +119,11 @@ def test_the_influence_of_remedies_is_that_with_the_right_units(log):
     assert told["reading"].remedy == alone["reading"].remedy
     assert told["reading"].influence == pytest.approx(alone["reading"].influence, rel=1e-6)
     assert told[CHECK].influence > 0.99
+
+
+def test_lengths_in_millimetres():
+    log = make_hidden_effect_log(arm(), None, n_trajectories=3, duration=5.0, random_state=1)
+    (told,) = check_log(log.frame, arm(centers="200 200 100", length=400.0)).checks
+    assert (told.check, told.certainty) == ("description_lengths", "certain")
+    assert "in mm instead of m" in told.suspicion
+    assert not any(s.check == "description_lengths" for s in check_log(log.frame, arm()).checks)

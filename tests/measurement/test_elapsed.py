@@ -103,3 +103,9 @@ def test_velocities_in_turns_are_not_lost_rows():
     told = told_of(FRAME.assign(**{c: FRAME[c] / (2 * np.pi) for c in velocities}))
     assert "lost_rows" not in told and "constant_torque" not in told
     assert told["velocity"].remedy.option == "--units dq=rev/s"
+
+
+def test_speeds_without_a_sign_are_not_rows_in_another_order():
+    speeds = [c for c in FRAME if c.startswith("dq")]
+    told = told_of(FRAME.assign(**{name: FRAME[name].abs() for name in speeds}))
+    assert "lost_rows" not in told

@@ -32,6 +32,14 @@ def test_a_velocity_of_a_slow_bus_in_few_digits(signals, torque, found):
     assert told["held_velocity"].joints == (2,)
 
 
+def test_a_position_at_rest_beside_another_signal_as_its_velocity(signals, torque, found):
+    resting = signals.q[np.r_[:700, np.full(200, 700), 701:1801]]
+    velocity = signals.dq.copy()
+    velocity[:, 0] = torque[:, 0]
+    told = found(signals.with_(q=resting, dq=velocity), torque)
+    assert not any("stuck" in s.suspicion for s in told)
+
+
 def test_a_torque_that_is_stuck_for_a_while(signals, torque, found):
     stuck = torque.copy()
     stuck[700:900, 0] = stuck[700, 0]
