@@ -13,13 +13,15 @@ from skidyn._signals import Array
 from skidyn._text import inside, interval_told, joints_told, listed, trajectories_told
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._episodes import Episode
-from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis
+from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, rivals_among
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import NamelessEffect, Term, get_effect
 from skidyn.evidence import Problem
 
 #: Another kind with at least this share of the best one's score is a rival.
 RIVAL_SHARE = 0.8
+#: A known effect that removes at least this share of what an unknown function removes is told.
+NEAREST_SHARE = 0.5
 #: Points of a curve.
 BINS = 40
 #: Number of times at which an effect acts that are listed.
@@ -80,6 +82,10 @@ class Finding:
         significant.
     instead : str or None
         Kind of another finding that would explain most of this one if its formula were different.
+    nearest : dict or None
+        ``{"kind", "share"}`` of the known effect that comes closest to an unknown torque, and the
+        share of the error removed by the unknown torque that it removes alone; None if that is
+        less than half.
 
     Examples
     --------
@@ -109,6 +115,7 @@ class Finding:
     elsewhere: tuple[tuple[int, ...], ...] = ()
     change: float = 0.0
     instead: str | None = None
+    nearest: dict[str, Any] | None = None
 
     def _repr_html_(self) -> str:
         from skidyn.diagnosis._notebook import finding_card
@@ -137,6 +144,7 @@ class Finding:
             "confidence": self.confidence,
             "change": self.change,
             "instead": self.instead,
+            "nearest": self.nearest,
             "trajectories": None if self.trajectories is None else list(self.trajectories),
             "acts": (self.terms[0].when or None) if self.terms else None,
             "form": (self.terms[0].form or None) if self.terms else None,
@@ -150,6 +158,40 @@ def rivals_of(best: Hypothesis) -> tuple[str, ...]:
     own, least = set(best.joints), RIVAL_SHARE * best.score
     near = [h.kind for h in best.others if h.score >= least and own & set(h.joints)]
     return tuple(dict.fromkeys(near))
+
+
+def nearest_of(problem: Problem, best: Hypothesis) -> dict[str, Any] | None:
+    """The known effect that comes closest to an unknown torque, without being a rival.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows of the log.
+    best : Hypothesis
+        The unknown torque, with the explanations of other kinds in its ranking.
+
+    Returns
+    -------
+    dict or None
+        As in :class:`Finding`.
+    """
+    if best.kind != UNKNOWN or best.torque is not None:
+        return None
+    counts = np.maximum(problem.rows.counts, 1)
+
+    def removed(hypothesis: Hypothesis) -> Array:
+        """Share of the squared error of the joints that it removes."""
+        share: Array = -np.expm1(-np.maximum(hypothesis.gain, 0.0) / counts)
+        return share[list(best.joints)]
+
+    whole, told = removed(best), rivals_of(best)
+    shares = {
+        other.kind: float(np.minimum(removed(other), whole).sum() / max(whole.sum(), 1e-300))
+        for other in reversed(rivals_among(best, best.others))
+        if other.kind not in told
+    }
+    kind = max(shares, key=lambda k: shares[k], default="")
+    return {"kind": kind, "share": shares[kind]} if shares.get(kind, 0) >= NEAREST_SHARE else None
 
 
 def make_finding(
@@ -215,6 +257,12 @@ def make_finding(
     elsewhere = tuple(tuple(j + 1 for j in pair) for pair in hypothesis.elsewhere)
     if elsewhere:
         sentence += f" It would explain the data equally well on {pairs_of(elsewhere)}."
+    nearest = nearest_of(problem, hypothesis)
+    if nearest:
+        sentence += (
+            f" Of the known effects, {rival_title(nearest['kind'])} comes closest: alone, it "
+            f"removes {nearest['share']:.0%} of the error that this torque removes."
+        )
     for u in formulas:
         assert u.proposal is not None
         sentence += f" An equivalent formula for joint {u.joint}: {u.proposal.text}."
@@ -237,6 +285,7 @@ def make_finding(
         term.trajectories,
         alike=hypothesis.alike,
         elsewhere=elsewhere,
+        nearest=nearest,
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from skidyn._signals import Array
 from skidyn._text import inside
@@ -141,7 +141,7 @@ class Gates:
             float(s.least_drop * self.whiteness[joint] * self.counts[joint]),
             float(s.form_tolerance * self.earlier[joint]),
         )
-        return float(np.sqrt(drop) + norm.ppf(POWER) * np.sqrt(inflation))
+        return float(np.sqrt(drop) + ndtri(POWER) * np.sqrt(inflation))
 
 
 def find_limits(

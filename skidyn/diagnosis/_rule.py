@@ -44,7 +44,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -723,6 +723,7 @@ def degrees_of_freedom(share: Array) -> float:
     return 1.0 / (float(h @ h) + pairs)
 
 
+@lru_cache(maxsize=4096)
 def least_significant(level: float, free: float) -> float:
     """Size of one coefficient, in standard errors, from which blocks find it significant.
 

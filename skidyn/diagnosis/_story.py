@@ -331,6 +331,9 @@ def sure(finding: Finding) -> str:
         text += f"{'; ' if text else ''}this data cannot separate it from {rivals}"
     elif finding.kind == "unknown":
         text = "no effect of the catalogue explains it"
+        if finding.nearest:
+            closest, share = rival_title(finding.nearest["kind"]), finding.nearest["share"]
+            text += f" fully; {closest} comes closest and removes {share:.0%} as much"
     elif is_setting(finding):
         text = "the torque that the motion requires is the evidence for it"
     elif not text:

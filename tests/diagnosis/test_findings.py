@@ -5,7 +5,8 @@ import json
 
 import numpy as np
 
-from skidyn.diagnosis import notes
+from skidyn.diagnosis import diagnose, notes
+from skidyn.identification import RBDRegressor
 
 
 def test_words_and_numbers_are_the_same(missing):
@@ -32,6 +33,21 @@ def test_the_curve_is_that_of_a_spring(missing):
         and abs(slope / missing.findings[0].parameters["k"]["value"] - 1) < 0.05
     )
     assert (curve["low"] <= curve["high"]).all()
+
+
+def test_the_known_effect_that_comes_closest_to_an_unknown_torque(complete_log):
+    q = complete_log.X["q2"].to_numpy()
+    bump = 1.5 * q + np.exp(-(((q - 0.3) / 0.1) ** 2))
+    log = complete_log
+    torque = log.y + np.column_stack([0 * q, bump])
+
+    diagnosis = diagnose(RBDRegressor(log.robot), log.X, torque)
+
+    (finding,) = diagnosis.findings
+    assert finding.kind == "unknown" and finding.variables == ("q2",)
+    assert "spring" in finding.nearest["kind"] and 0.5 < finding.nearest["share"] < 1
+    assert "Of the known effects" in finding.sentence
+    assert finding.to_dict()["nearest"] == finding.nearest
 
 
 def test_a_mass_below_zero_is_explained():
