@@ -28,8 +28,8 @@ class Acceleration(Check):
     name = "acceleration"
     stage = 2  # it is not that of a motion with wrong units or columns
     suspects = (
-        "logged accelerations with the opposite sign, in degrees, or of a signal other than the "
-        "velocities"
+        "logged accelerations with the opposite sign, in degrees, of another time, or of a signal "
+        "other than the velocities"
     )
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -132,7 +132,8 @@ def _lag(signals: Signals, joint: int, likeness: float) -> float:
         moved = np.concatenate(parts) if parts else ddq
         return velocity_consistency(signals.clock, dq, moved, signals.segments)[1]
 
-    if likeness > LIKE or sum(r.stop - r.start for r in signals.segments) != len(ddq):
+    unlike = likeness <= LIKE  # NaN without motion
+    if not unlike or sum(r.stop - r.start for r in signals.segments) != len(ddq):
         return 0.0
     found = np.array([at(int(n)) for n in tried])
     best = int(np.argmax(found))
