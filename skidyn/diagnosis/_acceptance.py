@@ -17,6 +17,7 @@ from skidyn.diagnosis._hypothesis import (
     family_of,
     grouped_by_joints,
     in_part,
+    removed_share,
     simplicity_of,
     within_recordings,
 )
@@ -454,9 +455,7 @@ class JudgingSearch(RankingSearch):
 
     def _removed(self, errors: Array, gain: Array) -> Array:
         """Reduction of the squared error of every joint by a gain of log-likelihood."""
-        counts = np.maximum(self.problem.rows.counts, 1)
-        share: Array = -np.expm1(-np.maximum(gain, 0.0) / counts)
-        return errors * share
+        return errors * removed_share(gain, self.problem.rows.counts)
 
     def _at_its_limit(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """The hypothesis, or the simpler kind that is equivalent to its unresolved terms.

@@ -13,7 +13,7 @@ from skidyn._signals import Array
 from skidyn._text import inside, interval_told, joints_told, listed, trajectories_told
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._episodes import Episode
-from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, rivals_among
+from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, removed_share, rivals_among
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import NamelessEffect, Term, get_effect
 from skidyn.evidence import Problem
@@ -177,17 +177,14 @@ def nearest_of(problem: Problem, best: Hypothesis) -> dict[str, Any] | None:
     """
     if best.kind != UNKNOWN or best.torque is not None:
         return None
-    counts = np.maximum(problem.rows.counts, 1)
 
     def removed(hypothesis: Hypothesis) -> Array:
-        """Share of the squared error of the joints that it removes."""
-        share: Array = -np.expm1(-np.maximum(hypothesis.gain, 0.0) / counts)
-        return share[list(best.joints)]
+        return removed_share(hypothesis.gain, problem.rows.counts)[list(best.joints)]
 
     whole, told = removed(best), rivals_of(best)
     shares = {
         other.kind: float(np.minimum(removed(other), whole).sum() / max(whole.sum(), 1e-300))
-        for other in reversed(rivals_among(best, best.others))
+        for other in reversed(rivals_among(best, best.others))  # the best of a kind stays
         if other.kind not in told
     }
     kind = max(shares, key=lambda k: shares[k], default="")

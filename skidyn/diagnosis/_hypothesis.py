@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
@@ -193,6 +194,24 @@ def margin_over(best: Hypothesis, rivals: Sequence[Hypothesis]) -> float:
     if not rivals or best.score <= 0:
         return 1.0
     return 1.0 - max(h.score for h in rivals) / best.score
+
+
+def removed_share(gain: Array, counts: NDArray[np.int64]) -> Array:
+    """Share of the squared error that a gain removes, (n_joints,).
+
+    Parameters
+    ----------
+    gain : ndarray of shape (n_joints,)
+        Twice the log-likelihood gain by joint.
+    counts : ndarray of shape (n_joints,)
+        Averaged rows of every joint.
+
+    Returns
+    -------
+    ndarray of shape (n_joints,)
+        0 where the error grows.
+    """
+    return np.asarray(-np.expm1(-np.maximum(gain, 0.0) / np.maximum(counts, 1)))
 
 
 def family_of(hypothesis: Hypothesis) -> str:
