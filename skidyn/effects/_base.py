@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._exceptions import EffectError
-from skidyn._signals import Signals
+from skidyn._signals import Array, Signals
 
-Array = NDArray[np.float64]
 #: Where an effect acts: on each joint by itself, on a pair of joints, or on the whole robot.
 Scope = Literal["joint", "pair", "robot"]
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from skidyn._exceptions import EffectError
-from skidyn._signals import Signals
-from skidyn.effects._base import Array, Coefficient, Effect
+from skidyn._signals import Array, Signals
+from skidyn.effects._base import Coefficient, Effect
 from skidyn.effects._term import Term
 
 #: Longest formula and largest exponent; formulas of friction or springs are far below both.

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from skidyn._signals import Signals
-from skidyn.effects._base import Array, Coefficient, Effect
+from skidyn._signals import Array, Signals
+from skidyn.effects._base import Coefficient, Effect
 
 #: Share of the gravity torque of other joints below which the first joint is vertical: descriptions
 #: round their angles.

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Signals
-from skidyn.effects._base import Array, Coefficient, Effect, Shape
+from skidyn._signals import Array, Signals
+from skidyn.effects._base import Coefficient, Effect, Shape
 
 
 @dataclass(frozen=True)

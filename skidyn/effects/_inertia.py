@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from skidyn._signals import Signals
-from skidyn.effects._base import Array, Coefficient, Effect
+from skidyn._signals import Array, Signals
+from skidyn.effects._base import Coefficient, Effect
 
 
 class RotorInertia(Effect):

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from skidyn._signals import Signals
-from skidyn.effects._base import Array, Coefficient, Effect, Shape
+from skidyn._signals import Array, Signals
+from skidyn.effects._base import Coefficient, Effect, Shape
 
 #: Velocity of a joint that moves, as a share of its largest, and least share of these samples in
 #: which the load moves the joint.

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from skidyn._signals import Signals
-from skidyn.effects._base import Array, Coefficient, Effect, Shape
+from skidyn._signals import Array, Signals
+from skidyn.effects._base import Coefficient, Effect, Shape
 from skidyn.effects._moments import moments, starts
 
 #: Temperature at which the derivatives are stated, in degrees Celsius.

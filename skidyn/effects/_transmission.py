@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from skidyn._signals import Signals
-from skidyn.effects._base import Array, Coefficient, Effect, Shape
+from skidyn._signals import Array, Signals
+from skidyn.effects._base import Coefficient, Effect, Shape
 from skidyn.effects._derivatives import smooth_derivatives
 from skidyn.effects._nameless import NamelessEffect
 
