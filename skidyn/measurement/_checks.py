@@ -48,6 +48,7 @@ from skidyn.measurement._held import (
     StuckPosition,
     StuckTorque,
 )
+from skidyn.measurement._joined import JoinedRecordings
 from skidyn.measurement._joint_gravity import JointGravity
 from skidyn.measurement._lengths import Lengths
 from skidyn.measurement._measurement import Measurement
@@ -61,7 +62,8 @@ from skidyn.measurement._torque import Columns, UnsignedTorque
 from skidyn.measurement._torque_delay import TorqueDelay
 from skidyn.measurement._torque_scale import TorqueScale
 from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
-from skidyn.measurement._velocity import JoinedRecordings, Velocity, VelocityDelay
+from skidyn.measurement._velocity import Velocity
+from skidyn.measurement._velocity_delay import VelocityDelay
 
 UNSIGNED = UnsignedTorque()
 #: The only list of checks in skidyn.
