@@ -40,11 +40,11 @@ from skidyn._signals import Signals as Signals
 from skidyn.effects._hysteresis import Law as Law, PathMemory as PathMemory
 from skidyn.effects._moments import starts as starts
 from skidyn.effects._motor_load import MotorLoadFriction as MotorLoadFriction
-from skidyn.effects._nameless import (
-    ClockPeriodic as ClockPeriodic,
+from skidyn.effects._nameless import NamelessEffect as NamelessEffect
+from skidyn.effects._nameless_periodic import ClockPeriodic as ClockPeriodic
+from skidyn.effects._nameless_signals import (
     FunctionOfSignals as FunctionOfSignals,
     FunctionOfSum as FunctionOfSum,
-    NamelessEffect as NamelessEffect,
 )
 from skidyn.effects._registry import (
     nameless_kinds as nameless_kinds,

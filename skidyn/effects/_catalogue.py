@@ -26,6 +26,8 @@ from skidyn.effects._motor_load import MOTOR_LOAD
 from skidyn.effects._nameless import NAMELESS
 from skidyn.effects._nameless_coupled import COUPLED
 from skidyn.effects._nameless_history import HISTORY
+from skidyn.effects._nameless_periodic import PERIODIC
+from skidyn.effects._nameless_signals import OF_SIGNALS
 from skidyn.effects._nameless_tool import AT_TOOL
 from skidyn.effects._position import PositionDependentFriction, TorqueRipple
 from skidyn.effects._registry import get_effect, register_effect
@@ -73,7 +75,8 @@ _CLASSES: tuple[type[Effect], ...] = (
     *MOTOR_LOAD,
     *SERVO,
 )
-for _cls in (*_CLASSES, *NAMELESS, *HISTORY, *AT_TOOL, *COUPLED, AccelerationNoise, Formula):
+_NAMELESS = (*NAMELESS, *OF_SIGNALS, *PERIODIC, *HISTORY, *AT_TOOL, *COUPLED)
+for _cls in (*_CLASSES, *_NAMELESS, AccelerationNoise, Formula):
     register_effect(_cls)
 
 #: What users may write for a term: a kind, a kind with joints counted from 1, or a Term.

@@ -13,12 +13,8 @@ from skidyn._signals import Array, Signals
 from skidyn.effects._base import Shape
 from skidyn.effects._hysteresis import cut_strokes, dahl_state, stop_along, strokes_of
 from skidyn.effects._moments import moments
-from skidyn.effects._nameless import (
-    NamelessEffect,
-    splines,
-    supported_range,
-    unnamed_coefficients,
-)
+from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
+from skidyn.effects._smooth import splines, supported_range
 
 #: Distances since the last reversal, rad or tenths of m, over which a torque may fade.
 _WAYS = (0.01, 0.03, 0.1, 0.3)

@@ -12,12 +12,8 @@ from numpy.polynomial.legendre import legvander
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Shape
-from skidyn.effects._nameless import (
-    NamelessEffect,
-    splines,
-    supported_range,
-    unnamed_coefficients,
-)
+from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
+from skidyn.effects._smooth import splines, supported_range
 from skidyn.effects._tool import tool_jacobian, tool_position
 
 #: Number of places at which a force is tried, and its widths as shares of the extent of the motion.

@@ -39,3 +39,14 @@ def columns_of():
         return get_effect(kind).columns(signals, joint, **shape)
 
     return columns
+
+
+@pytest.fixture(scope="session")
+def left_by():
+    """Share of the size of a torque that columns cannot take."""
+
+    def left(columns, torque):
+        fit = columns @ np.linalg.lstsq(columns, torque, rcond=None)[0]
+        return float(np.std(torque - fit) / np.std(torque))
+
+    return left

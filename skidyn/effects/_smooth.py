@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Smooth functions of a signal on the range that it covers, continued beyond it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+from numpy.typing import NDArray
+
+from skidyn._signals import Array, Signals
+
+#: Share of the samples of a trajectory left out at either end of its range.
+_OUTSIDE = 0.002
+#: Number of trajectories that must reach a value for a function to be fitted there.
+_REACHING = 3
+#: Share of the range over which the secant is computed that continues a function beyond it.
+_SECANT = 0.15
+#: Highest order of a function of one signal.
+HIGHEST_ORDER = 12
+#: Range of a signal that is more than rounding, as a share of its values.
+_LEAST_RANGE = 1e-9
+
+
+def splines(x: Array, low: float, high: float, count: int) -> Array:
+    """Cubic B-splines on a range, continued beyond it, shape (n_samples, count).
+
+    Their sum is a constant, which the model may lack. The recursion is that of Cox and de Boor
+    [1]_, for the four splines that are not zero at a sample.
+
+    References
+    ----------
+    .. [1] L. Piegl, W. Tiller (1997), The NURBS book, 2nd ed., Springer, algorithm A2.2.
+    """
+    if not high - low > _LEAST_RANGE * max(abs(low), abs(high)):
+        return np.zeros((len(x), count))  # a joint at one place, but for rounding
+    degree = 3
+    n_pieces = count - degree
+    knots = np.r_[[low] * degree, np.linspace(low, high, n_pieces + 1), [high] * degree]
+
+    def functions(inside: Array) -> Array:
+        inside = np.clip(inside, low, high - 1e-9 * (high - low))
+        piece = ((inside - low) * (n_pieces / (high - low))).astype(np.int64)
+        piece = np.minimum(piece, n_pieces - 1)
+        before = [inside - knots[piece + degree - k] for k in range(degree)]
+        after = [knots[piece + degree + 1 + k] - inside for k in range(degree)]
+        values: list[Any] = [1.0]
+        for order in range(1, degree + 1):
+            carried, raised = 0.0, []
+            for r, value in enumerate(values):
+                part = value / (after[r] + before[order - 1 - r])
+                raised.append(carried + after[r] * part)
+                carried = before[order - 1 - r] * part
+            values = [*raised, carried]
+        columns = np.zeros((len(inside), count))
+        place = np.arange(0, columns.size, count) + piece
+        for r, value in enumerate(values):
+            columns.ravel()[place + r] = value
+        return columns
+
+    return continued(functions, x, low, high)
+
+
+def supported_range(signals: Signals, x: Array) -> tuple[float, float]:
+    """Range of a signal that several trajectories cover, so that no single one decides."""
+    (found,) = supported_ranges(signals, x[:, None])
+    return found
+
+
+def supported_ranges(signals: Signals, x: Array) -> list[tuple[float, float]]:
+    """:func:`supported_range` of several signals, shape (n_samples, n_signals)."""
+    rows = signals.once("rows of trajectories", lambda: _rows_of_trajectories(signals))
+    ends = np.array([np.quantile(x[own], [_OUTSIDE, 1 - _OUTSIDE], axis=0) for own in rows])
+    ends.sort(axis=0)
+    at = min(_REACHING, (len(ends) + 1) // 2) - 1
+    return [
+        (float(low[at]), float(high[-1 - at]))
+        if high[-1 - at] > low[at]
+        else (float(low[0]), float(high[-1]))
+        for low, high in np.moveaxis(ends, 2, 0).transpose(0, 2, 1)
+    ]
+
+
+def _rows_of_trajectories(signals: Signals) -> list[NDArray[np.int64]]:
+    return [np.flatnonzero(signals.trajectory == k) for k in np.unique(signals.trajectory)]
+
+
+def continued(functions: Callable[[Array], Array], x: Array, low: float, high: float) -> Array:
+    """Functions on a range, continued beyond it along their secants over its outer parts."""
+    values = functions(np.clip(x, low, high))
+    reach = _SECANT * (high - low)
+    for beyond, edge, inner in (
+        (np.minimum(x - low, 0.0), low, low + reach),
+        (np.maximum(x - high, 0.0), high, high - reach),
+    ):
+        rows = np.flatnonzero(beyond)
+        if len(rows):
+            at_edge, inside = functions(np.array([edge, inner]))
+            values[rows] += np.outer(beyond[rows] / (edge - inner), at_edge - inside)
+    return values
+
+
+def ordered_functions(x: Array, sign: Array | None, low: float, high: float) -> Array:
+    """Functions of one signal by rising order, the constant first."""
+    if sign is None:
+        inside = (2 * x - low - high) / max(high - low, 1e-300)
+        return continued(lambda t: np.asarray(legvander(t, HIGHEST_ORDER)), inside, -1.0, 1.0)
+    v = np.clip(x / max(-low, high, 1e-300), -1.0, 1.0)
+    size = np.abs(v)
+    powers = [np.ones_like(v), v, sign, size, v * v, v * size, v**3, size**3]
+    powers += [sign * size ** (0.5 * k) for k in range(1, HIGHEST_ORDER - len(powers) + 2)]
+    return np.column_stack(powers)
