@@ -198,6 +198,11 @@ class Signals:
         """Contiguous runs of rows; states of hysteresis, filters and windows never cross them."""
         return find_segments(self.trajectory, self.time)
 
+    @property
+    def within(self) -> NDArray[np.bool_]:
+        """Steps from row to row that stay within a trajectory, (n_samples - 1,)."""
+        return np.asarray(self.trajectory[1:] == self.trajectory[:-1])
+
     @cached_property
     def clock(self) -> Array:
         """Time in s; the sample number if no time is logged."""
@@ -206,7 +211,7 @@ class Signals:
     @cached_property
     def rate(self) -> float:
         """Median sampling rate, Hz; 1 if no time is logged."""
-        steps = np.diff(self.clock)[np.diff(self.trajectory) == 0]
+        steps = np.diff(self.clock)[self.within]
         steps = steps[steps > 0]
         return 1.0 / float(np.median(steps)) if len(steps) else 1.0
 

@@ -37,6 +37,7 @@ def test_signals_know_their_units_and_can_be_taken_in_part():
     np.testing.assert_array_equal(signals.clock, np.arange(20))
     part = signals.take(slice(5, 15))
     np.testing.assert_array_equal(part.q, q[5:15])
+    np.testing.assert_array_equal(part.within, np.arange(9) != 4)
     assert part.segments == [slice(0, 5), slice(5, 10)]
 
 

@@ -362,7 +362,7 @@ def _coarse(measurement: Measurement) -> bool:
             sizes.append(float(np.median(changes[changes > 0])) / step)
     if not sizes or np.median(sizes) > STEPS:
         return False
-    same = np.all(s.q[1:] == s.q[:-1], axis=1) & (s.trajectory[1:] == s.trajectory[:-1])
+    same = np.all(s.q[1:] == s.q[:-1], axis=1) & s.within
     other = np.any(measurement.torque[1:] != measurement.torque[:-1], axis=1)
     return bool(np.mean(other[same]) > 0.5) if same.any() else False
 

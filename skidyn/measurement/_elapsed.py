@@ -93,9 +93,8 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
     used = np.flatnonzero((spread > 1e-3) & (s.dq.std(axis=0) > 1e-3))
     used = np.setdiff1d(used, list(measurement.held))  # a held position catches up in one step
     used = used[~_one_way(s, measurement.unwrapped)[used]]
-    together = s.trajectory[1:] == s.trajectory[:-1]
     time = np.diff(s.clock)
-    together &= time > 0
+    together = s.within & (time > 0)
     if len(used) < 2 or together.sum() < 200:
         return None
     q, dq, time = measurement.unwrapped[:, used], s.dq[:, used], time[together]
@@ -123,7 +122,7 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
 
 def _one_way(signals: Signals, position: Array) -> NDArray[np.bool_]:
     """Joints whose velocity has one sign although they move both ways: theirs is a speed."""
-    moved = np.diff(position, axis=0)[signals.trajectory[1:] == signals.trajectory[:-1]]
+    moved = np.diff(position, axis=0)[signals.within]
     forth, back = np.maximum(moved, 0).sum(axis=0), np.maximum(-moved, 0).sum(axis=0)
     small = ONE_SIGN * np.abs(signals.dq).max(axis=0)
     one_sign = (signals.dq.min(axis=0) > -small) | (signals.dq.max(axis=0) < small)

@@ -43,8 +43,7 @@ class HeldTorque(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         s = measurement.signals
-        together = s.trajectory[1:] == s.trajectory[:-1]
-        moved = np.any(s.q[1:] != s.q[:-1], axis=1) & together
+        moved = np.any(s.q[1:] != s.q[:-1], axis=1) & s.within
         if moved.sum() < 50:
             return
         held_all = is_held(measurement.torque, moved)
@@ -123,12 +122,11 @@ class HeldVelocity(Check):
         if measurement.stale:
             return  # reported already
         s = measurement.signals
-        together = s.trajectory[1:] == s.trajectory[:-1]
         shares = {}
         for k in range(s.n_joints):
             q, dq = s.q[:, k], s.dq[:, k]
             # the velocity of a joint at rest, or at constant speed, does not change
-            moved = together & (q[1:] != q[:-1]) & (dq[1:] != 0) & _accelerates(q)
+            moved = s.within & (q[1:] != q[:-1]) & (dq[1:] != 0) & _accelerates(q)
             if not measurement.excited[k] or moved.sum() < 50:
                 continue
             share = float(np.mean(dq[1:][moved] == dq[:-1][moved]))

@@ -79,8 +79,8 @@ def _of_one_joint(measurement: Measurement, joint: int) -> bool:
     expected = s.dq[rows] * (s.clock[rows] - s.clock[rows - 1])[:, None]
     moved = s.q[rows] - s.q[rows - 1]
     others = np.arange(s.n_joints) != joint
-    within = s.trajectory[1:] == s.trajectory[:-1]  # a trajectory ends before a jump
-    usual = np.abs(np.diff(s.q, axis=0))[within].max(axis=0, initial=0.0)
+    # a trajectory ends before a jump
+    usual = np.abs(np.diff(s.q, axis=0))[s.within].max(axis=0, initial=0.0)
     even = np.abs(moved - expected) <= usual
     fast = np.abs(s.dq[rows]) > MOVING * np.abs(s.dq).max(axis=0)
     alone = ~even[:, joint] & even[:, others].all(axis=1)

@@ -154,7 +154,7 @@ class Measurement:
         """
         s = self.signals
         first = np.zeros(s.n_samples, dtype=np.int64)
-        first[1:] = s.trajectory[1:] != s.trajectory[:-1]
+        first[1:] = ~s.within
         first[rows] = 1
         self.signals = s.with_(trajectory=np.cumsum(first))
         self._forget()
@@ -226,8 +226,7 @@ class Measurement:
     @cached_property
     def steps(self) -> Array:
         """Time steps inside trajectories, s."""
-        time, number = self.signals.clock, self.signals.trajectory
-        return np.asarray(np.diff(time)[number[1:] == number[:-1]])
+        return np.asarray(np.diff(self.signals.clock)[self.signals.within])
 
     @property
     def rate(self) -> float:
@@ -371,9 +370,8 @@ class Measurement:
     def held(self) -> dict[int, float]:
         """Joints whose position holds its last value, from 0, and in what share of their rows."""
         s = self.signals
-        within = s.trajectory[1:] == s.trajectory[:-1]
         steps = self.position_steps
-        shares = {k: held_share(s.q[:, k], within, steps[k]) for k in range(self.n_joints)}
+        shares = {k: held_share(s.q[:, k], s.within, steps[k]) for k in range(self.n_joints)}
         free = [k for k, share in shares.items() if share < HELD_BY_ONE / 2 and self.excited[k]]
         # if all hold, rows repeat, or the sensors are coarse
         return {k: x for k, x in shares.items() if x > HELD_BY_ONE and self.excited[k] and free}

@@ -50,8 +50,7 @@ def overflowed_columns(s: Signals, torques: Array) -> dict[int, int]:
     torques : ndarray of shape (n_samples, n_joints), N m or N
         Recorded torque.
     """
-    together = s.trajectory[1:] == s.trajectory[:-1]
-    jumps = {k: _overflows(torque, s.dq[:, k], together) for k, torque in enumerate(torques.T)}
+    jumps = {k: _overflows(torque, s.dq[:, k], s.within) for k, torque in enumerate(torques.T)}
     return {k: count for k, count in jumps.items() if count >= OVERFLOWS}
 
 
