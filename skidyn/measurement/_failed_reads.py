@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import MANY_MISSING
+from skidyn.measurement._measures import MANY_MISSING, equal_values
 from skidyn.measurement._placeholder import CHANNELS, in_words, placeholder_remedy
 from skidyn.measurement._suspicion import Suspicion, exactly
 
@@ -128,8 +128,7 @@ def failed_reads(measurement: Measurement) -> list[FailedRead]:
 def _placed(values: Array, trajectory: NDArray[np.int64]) -> dict[float, NDArray[np.intp]]:
     """First rows of the places to which a channel jumps and from which it returns, by value."""
     together = trajectory[1:] == trajectory[:-1]
-    begins = np.flatnonzero(np.r_[True, (values[1:] != values[:-1]) | ~together])
-    ends = np.append(begins[1:], len(values))
+    begins, ends = equal_values(values, trajectory)
     inside = (begins > 0) & (ends < len(values)) & (ends - begins <= MOST_ROWS)
     begins, ends = begins[inside], ends[inside]
     inside = together[begins - 1] & together[ends - 1]

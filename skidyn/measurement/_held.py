@@ -16,6 +16,7 @@ from skidyn.measurement._measures import (
     MANY_MISSING,
     RECURS,
     STRIDE,
+    equal_values,
     is_held,
     step_of_values,
 )
@@ -176,11 +177,12 @@ def stuck_parts(measurement: Measurement, k: int) -> list[tuple[int, int]]:
     s, torque = measurement.signals, measurement.torque[:, k]
     if np.ptp(torque) == 0 or measurement.idle.any():
         return []
-    begins, lengths = _equal_values(torque, s.trajectory)
+    begins, ends = equal_values(torque, s.trajectory)
+    lengths = ends - begins
     others = np.sort(lengths)[: max(len(lengths) - MOST_STUCK, 1)]
     long = np.flatnonzero(lengths >= max(LONG, LONGER * others[-1]))
     far = STUCK_WAY * float(np.ptp(s.q[:, k]))
-    parts = [(int(begins[i]), int(begins[i] + lengths[i])) for i in long]
+    parts = list(zip(begins[long].tolist(), ends[long].tolist(), strict=True))
     limits = (torque.min(), torque.max(), 0.0)
     whole = [torque[s.trajectory == run] for run in np.unique(s.trajectory[[a for a, _ in parts]])]
     if any(np.ptp(own) == 0 for own in whole):
@@ -220,11 +222,12 @@ class StuckPosition(Check):
             return
         known = measurement.stuck
         for k in np.flatnonzero(measurement.excited).tolist():
-            begins, lengths = _equal_values(s.q[:, k], s.trajectory)
+            begins, ends = equal_values(s.q[:, k], s.trajectory)
+            lengths = ends - begins
             if not _follows(s, k, np.repeat(lengths, lengths) >= LONG):
                 continue  # its velocity is another signal, which tells nothing about its position
             for i in np.flatnonzero(lengths >= LONG):
-                a, b = int(begins[i]), int(begins[i] + lengths[i])
+                a, b = int(begins[i]), int(ends[i])
                 run, speed = int(s.trajectory[a]), s.dq[a:b, k]
                 way = np.cumsum(speed[1:] * np.diff(s.clock[a:b]))  # noise cancels
                 if np.ptp(way) < LEAST_SWEPT or speed.std() < LEAST_SPEED:
@@ -252,16 +255,6 @@ def _follows(signals: Signals, joint: int, stuck: NDArray[np.bool_]) -> bool:
     fast = np.abs(swept) > np.median(np.abs(swept)) if len(swept) else swept > 0
     off = np.abs(moved - swept)[fast] / np.abs(swept[fast])
     return bool(len(off) and np.median(off) < FOLLOWING)  # the median, since values may be missing
-
-
-def _equal_values(
-    values: Array, trajectory: NDArray[np.int64]
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """First rows and lengths of the parts of recordings with one value."""
-    begins = np.flatnonzero(
-        np.r_[True, (values[1:] != values[:-1]) | (trajectory[1:] != trajectory[:-1])]
-    )
-    return begins, np.diff(np.append(begins, len(values)))
 
 
 class MissingTorque(Check):

@@ -192,6 +192,19 @@ def is_held(torque: np.ndarray, moved: np.ndarray) -> np.ndarray:
     return again
 
 
+def equal_values(values: np.ndarray, trajectory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First rows of the parts of recordings with one value of a channel, and those after them.
+
+    Parameters
+    ----------
+    values, trajectory : ndarray of shape (n_samples,)
+        Channel, and recording of every row.
+    """
+    new = (values[1:] != values[:-1]) | (trajectory[1:] != trajectory[:-1])
+    begins = np.flatnonzero(np.r_[True, new])
+    return begins, np.append(begins[1:], len(values))
+
+
 def idle_rows(
     position: np.ndarray, torque: np.ndarray, time: np.ndarray, trajectory: np.ndarray
 ) -> np.ndarray:

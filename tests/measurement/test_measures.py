@@ -11,7 +11,7 @@ from skidyn.measurement import (
     rest_share,
     reversals,
 )
-from skidyn.measurement._measures import velocity_consistency
+from skidyn.measurement._measures import equal_values, velocity_consistency
 
 TIME = np.arange(2000) * 0.01
 WAVE = np.sin(TIME)
@@ -52,3 +52,8 @@ def test_lost_samples_near_the_others_do_not_change_the_scale_of_a_velocity():
         t, np.where(lost, 0.0, q), 0.1 * np.cos(2 * t), [slice(0, len(t))]
     )
     assert abs(slope - 1) < 0.02 and likeness > 0.98
+
+
+def test_parts_of_one_value_end_with_their_recording():
+    begins, ends = equal_values(np.array([3.0, 3, 1, 1, 1, 2]), np.array([0, 0, 0, 0, 1, 1]))
+    assert begins.tolist() == [0, 2, 4, 5] and ends.tolist() == [2, 4, 5, 6]
