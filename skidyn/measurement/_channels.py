@@ -12,7 +12,7 @@ from skidyn.evidence import broken_notes
 from skidyn.measurement._around_zero import dead_bands
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import COARSE, FEW_VALUES, channel_step, is_short
+from skidyn.measurement._measures import COARSE, FEW_VALUES, channel_step, is_short, step_share
 from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Share of rows at the extreme torque from which it is reported.
@@ -85,10 +85,11 @@ class CoarseVelocity(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         s, told = measurement.signals, []
         for k in np.flatnonzero(measurement.excited).tolist():
-            step, spread = measurement.velocity_steps[k], float(s.dq[:, k].std())
+            step = measurement.velocity_steps[k]
+            share = step_share(s.dq[:, k], step)
             own = measurement.position_steps[k] * measurement.rate
-            if step > NOTED_STEP * spread > 0 and not step < COARSER * own:
-                told.append((k, step, step / spread))
+            if share > NOTED_STEP and not step < COARSER * own:
+                told.append((k, step, share))
         if told:
             joints = [k for k, _, _ in told]
             yield self.suspicion(
@@ -207,9 +208,10 @@ def coarse_torques(measurement: Measurement) -> dict[int, tuple[float, float]]:
     found = {}
     for k in range(measurement.n_joints):
         torque = measurement.torque[:, k]
-        step, spread = channel_step(torque), float(torque.std())
-        if np.isfinite(step) and step > NOTED_STEP * spread > 0:
-            found[k] = (step, step / spread)
+        step = channel_step(torque)
+        share = step_share(torque, step)
+        if share > NOTED_STEP:
+            found[k] = (step, share)
     return found
 
 

@@ -85,6 +85,19 @@ def channel_step(values: np.ndarray) -> float:
     return step_of_values(distinct)
 
 
+def step_share(values: np.ndarray, step: float) -> float:
+    """Step of a channel as a share of its standard deviation; 0 if it is not coarse, or constant.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_samples,)
+    step : float
+        As of :func:`channel_step`.
+    """
+    spread = float(values.std())
+    return step / spread if np.isfinite(step) and spread else 0.0
+
+
 def is_repeated(position: np.ndarray, velocity: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
     """Rows in which no position changes although some joint moves, as a mask."""
     again = np.zeros(len(position), dtype=bool)

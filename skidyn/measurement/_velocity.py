@@ -9,7 +9,7 @@ import numpy as np
 
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import ALIKE, Measurement
-from skidyn.measurement._measures import velocity_consistency
+from skidyn.measurement._measures import step_share, velocity_consistency
 from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion, remedy_of
 from skidyn.measurement._tachometer import Fault, find_fault
@@ -85,7 +85,8 @@ class Velocity(Check):
             if fault is not None:
                 faults.append(self._faulty(measurement, k, fault))
                 continue
-            if abs(slope - 1) < max(NEAR, CUT * _coarseness(measurement, k)):
+            coarse = step_share(measurement.signals.dq[:, k], measurement.velocity_steps[k])
+            if abs(slope - 1) < max(NEAR, CUT * coarse):
                 continue
             if k in measurement.millimetres:
                 continue
@@ -203,12 +204,6 @@ def _constant(measurement: Measurement) -> list[int]:
     moves &= np.ptp(s.q, axis=0) > LEAST_MOTION
     turns = (np.mean(np.diff(s.dq, axis=0) != 0, axis=0) > 0.5) & (s.dq.std(axis=0) > LEAST_SPEED)
     return [int(k) for k in np.flatnonzero((still & turns) | (stands & moves))]
-
-
-def _coarseness(measurement: Measurement, k: int) -> float:
-    """Step of a coarse velocity, as a share of its spread; 0 if it is not coarse."""
-    step, spread = measurement.velocity_steps[k], float(measurement.signals.dq[:, k].std())
-    return step / spread if np.isfinite(step) and spread else 0.0
 
 
 def _of_units(slope: float) -> bool:
