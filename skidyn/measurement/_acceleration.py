@@ -11,7 +11,7 @@ from skidyn._signals import Signals
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._measures import velocity_consistency
-from skidyn.measurement._suspicion import Suspicion, remedy_of
+from skidyn.measurement._suspicion import Suspicion, names_in_option, remedy_of
 from skidyn.measurement._units import NEAR
 
 #: Slopes of integrated acceleration on velocity of a filtered or noisy acceleration, and the
@@ -64,7 +64,7 @@ class Acceleration(Check):
     def _late(self, measurement: Measurement, lags: dict[int, float]) -> Suspicion:
         """Accelerations of another time."""
         joints, lag = list(lags), float(np.median(list(lags.values())))
-        columns = ["ddq"] if len(joints) == measurement.n_joints else [f"ddq{k + 1}" for k in lags]
+        columns = names_in_option("ddq", joints, measurement.n_joints)
         return self.suspicion(
             f"the acceleration of {measurement.joints(joints)} is {'late' if lag > 0 else 'early'} "
             f"by about {1e3 * abs(lag):.0f} ms relative to the velocity",
@@ -98,9 +98,8 @@ class Acceleration(Check):
             remedy = remedy_of("flip", columns)
         elif cause == "degrees":
             what = f"accelerations look like degrees on {names}"
-            every = len(joints) == measurement.n_joints
-            quantities = ["ddq"] if every else [f"ddq{k + 1}" for k in joints]
-            remedy = remedy_of("units", dict.fromkeys(quantities, "deg/s^2"))
+            columns = names_in_option("ddq", joints, measurement.n_joints)
+            remedy = remedy_of("units", dict.fromkeys(columns, "deg/s^2"))
         return self.suspicion(what, evidence, "suspected", joints, remedy)
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from skidyn._text import joints_told, listed
-from skidyn.measurement._suspicion import remedy_of
+from skidyn.measurement._suspicion import names_in_option, remedy_of
 
 #: Quantities of a measurement, and their plurals.
 CHANNELS = {"q": "positions", "dq": "velocities", "tau": "torques"}
@@ -32,7 +32,7 @@ def placeholder_remedy(
         names = []
         for quantity in CHANNELS:
             joints = [k for own, k in channels if own == quantity]
-            names += [quantity] if len(joints) == n else [f"{quantity}{k + 1}" for k in joints]
+            names += names_in_option(quantity, joints, n)
     return remedy_of("placeholder", dict.fromkeys(names, value))
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -69,6 +69,26 @@ def remedy_of(argument: str, value: Any) -> tuple[str, str]:
     if value is not True:
         option += f" {_in_option(value)}"
     return option, f"{argument}={value!r}"
+
+
+def names_in_option(quantity: str, joints: Sequence[int], n_joints: int) -> list[str]:
+    """Name of a quantity in an option if it is that of all joints, otherwise of its columns.
+
+    Parameters
+    ----------
+    quantity : str
+        Such as ``"dq"``.
+    joints : sequence of int
+        Joints, from 0.
+    n_joints : int
+        Number of all joints.
+
+    Examples
+    --------
+    >>> names_in_option("dq", [0, 1], 2), names_in_option("dq", [1], 2)
+    (['dq'], ['dq2'])
+    """
+    return [quantity] if len(joints) == n_joints else [f"{quantity}{k + 1}" for k in joints]
 
 
 def _in_option(value: Any) -> str:

@@ -11,7 +11,7 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._measures import step_share, velocity_consistency
 from skidyn.measurement._reading import Reading
-from skidyn.measurement._suspicion import Suspicion, remedy_of
+from skidyn.measurement._suspicion import Suspicion, names_in_option, remedy_of
 from skidyn.measurement._tachometer import Fault, find_fault
 from skidyn.measurement._units import (
     CLOCKS,
@@ -153,7 +153,6 @@ class Velocity(Check):
                 joints,
                 remedy_of("flip", columns),
             )
-        every = len(joints) == measurement.n_joints
         if cause in ("scale", "other"):
             what = f"the velocity of {names} is not the derivative of the position"
             if cause == "other":
@@ -169,7 +168,8 @@ class Velocity(Check):
                 remedy_of("gain", pairs),
             )
         quantity, unit = cause.split("=")
-        units = {quantity: unit} if every else {f"{quantity}{k + 1}": unit for k in joints}
+        columns = names_in_option(quantity, joints, measurement.n_joints)
+        remedy = remedy_of("units", dict.fromkeys(columns, unit))
         what = "velocities" if quantity == "dq" else "positions"
         unit = {"deg": "degrees", "rev": "turns"}.get(unit, unit)
         return self.suspicion(
@@ -177,7 +177,7 @@ class Velocity(Check):
             evidence,
             "certain",
             joints,
-            remedy_of("units", units),
+            remedy,
         )
 
 
