@@ -112,12 +112,15 @@ def lowpass_of_torque(fits: Fits, lag: float, late: Sequence[int]) -> tuple[floa
 
     from scipy.signal import lfilter  # its import takes half a second, and few logs need it
 
-    def filtered(constant: float) -> float:
+    def unfiltered(constant: float) -> Array:
         torque = np.empty_like(source.torque)
         for rows in source.segments:
             torque[rows] = without_lowpass(source.clock[rows], source.torque[rows], constant)
+        return torque
+
+    def filtered(constant: float) -> float:
         samples = fits.torque.copy()
-        samples[:, late] = torque[source.picked][:, late]
+        samples[:, late] = unfiltered(constant)[source.picked][:, late]
         left = together.left(samples, together.fit(samples))
         passed = 1 - np.exp(-step / constant)
         for column, k in enumerate(together.joints):
@@ -134,10 +137,7 @@ def lowpass_of_torque(fits: Fits, lag: float, late: Sequence[int]) -> tuple[floa
 
     def still_late(constant: float) -> float:
         """Lag of the torque without the low pass, by a parabola."""
-        torque = np.empty_like(source.torque)
-        for rows in source.segments:
-            torque[rows] = without_lowpass(source.clock[rows], source.torque[rows], constant)
-        other = replace(fits, recorded=replace(source, torque=torque))
+        other = replace(fits, recorded=replace(source, torque=unfiltered(constant)))
         left, middle, right = (
             together.likelihood(other.torque_at(shift)) for shift in (-NEAR, 0.0, NEAR)
         )
