@@ -14,7 +14,7 @@ from skidyn.measurement._arrival import rows_after_false_gaps, without_false_gap
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import is_repeated
-from skidyn.measurement._suspicion import Suspicion, remedy_of
+from skidyn.measurement._suspicion import Suspicion, remedy_of, resample_to
 
 #: Stamps closer to a regular clock than this share of a step do not jitter.
 REGULAR = 1e-3
@@ -389,7 +389,7 @@ class InterpolatedRows(Check):
                 f"in {100 * on_line / moving:.0f} % of the moving rows all joints lie on straight "
                 "lines between their neighbours, so accelerations are those of the interpolation",
                 "certain",
-                remedy=(f"--resample {rate:g}", f"resample_rate={rate:g}"),
+                remedy=resample_to(rate),
             )
             return
         moving, on_line, _ = _on_a_line(s, measurement.torque)

@@ -22,7 +22,7 @@ from skidyn.measurement._measures import (
 )
 from skidyn.measurement._odd_motion import LEAST_SPEED, LEAST_SWEPT
 from skidyn.measurement._placeholder import placeholder_remedy
-from skidyn.measurement._suspicion import Suspicion, remedy_of
+from skidyn.measurement._suspicion import Suspicion, remedy_of, resample_to
 
 #: Least share of rows with the torque of the previous row, for a torque that is not coarse.
 HELD = 0.3
@@ -206,7 +206,7 @@ class HeldPosition(Check):
                 f"it is reported at about {rate:g} Hz",
                 "certain",
                 [k],
-                (f"--resample {rate:g}", f"resample_rate={rate:g}"),
+                resample_to(rate),
             )
 
 

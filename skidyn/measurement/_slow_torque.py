@@ -16,7 +16,7 @@ from skidyn._signals import Array
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import divided_differences
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, resample_to
 
 #: Rows between two values of the slower bus that are tried, and orders of the differences: of held
 #: values, lines and cubic splines.
@@ -82,7 +82,7 @@ class SlowTorque(Check):
             f"{sum(gain for gain, _ in alike.values()):.0f}",
             "suspected",
             alike,
-            (f"--resample {rate:g}", f"resample_rate={rate:g}"),
+            resample_to(rate),
         )
 
 

@@ -71,6 +71,17 @@ def remedy_of(argument: str, value: Any) -> tuple[str, str]:
     return option, f"{argument}={value!r}"
 
 
+def resample_to(rate: float) -> tuple[str, str]:
+    """The option, and the argument of ``read_log``, for another sampling rate, Hz.
+
+    Parameters
+    ----------
+    rate : float, Hz
+        Rounded as it is to be printed.
+    """
+    return f"--resample {rate:g}", f"resample_rate={rate:g}"
+
+
 def names_in_option(quantity: str, joints: Sequence[int], n_joints: int) -> list[str]:
     """Name of a quantity in an option if it is that of all joints, otherwise of its columns.
 
