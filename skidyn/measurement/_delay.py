@@ -323,29 +323,22 @@ class JointFit:
         self.fits, self.changed = fits, list(changed)
         self.signals = s = Reading().motion(fits.signals)
         self.base = base_parameter_index(fits.robot)
-        last = 10 * fits.robot.n_bodies + LOAD if fits.loads else LOAD[:0]
-        regressor = fits.mean_regressor(fits.robot, s, np.append(self.base, last))
-        self.number = fits.recording if fits.loads else 0 * fits.recording
         self.joints: list[int] = []
         self.designs: list[Array] = []
         self.places: list[NDArray[np.int64]] = []
         self.rows: list[NDArray[np.bool_]] = []
         self.own: list[Array] = []
-        first = len(self.base) + n_loads(self.number)
-        for j in range(fits.n_joints):
+        first = len(self.base) + n_loads(fits.carrying)
+        for j, (bodies, felt, carried) in enumerate(fits.felt_bodies(fits.robot, s)):
             use = _sliding(fits, s, j)
             if not fits.usable(j) or use.sum() < FEWEST:
                 continue
             own = _own_columns(s, j)
-            felt = np.flatnonzero(regressor[:, j, : len(self.base)].any(axis=0))
-            load = by_recording(regressor[:, j, len(self.base) :], self.number)[use]
             self.joints.append(j)
             self.rows.append(use)
             self.own.append(own)
-            self.designs.append(
-                np.hstack([regressor[use, j][:, felt], load, fits.average(own)[use]])
-            )
-            loads = len(self.base) + np.arange(load.shape[1])
+            self.designs.append(np.hstack([bodies, carried, fits.average(own)])[use])
+            loads = len(self.base) + np.arange(carried.shape[1])
             self.places.append(np.concatenate([felt, loads, first + np.arange(own.shape[1])]))
             first += own.shape[1]
         self.torque = fits.average(fits.torque)
@@ -378,17 +371,16 @@ class JointFit:
         """Residual torque of every sample, for the fitted joints."""
         robot, s = self.fits.robot, self.signals
         parameters = np.zeros((robot.n_bodies, 10))
-        loads = np.zeros(n_loads(self.number))
+        number = self.fits.carrying
+        loads = np.zeros(n_loads(number))
         for place, fit in zip(self.places, fitted, strict=True):
             bodies = place < len(self.base)
             parameters.flat[self.base[place[bodies]]] = fit.coefficients[bodies]
             carried = (place >= len(self.base)) & (place < len(self.base) + len(loads))
             loads[place[carried] - len(self.base)] = fit.coefficients[carried]
         rigid = robot.inverse_dynamics(s.q, s.dq, s.ddq, parameters=parameters)
-        for run, load in zip(
-            np.unique(self.number)[1:], loads.reshape(-1, len(LOAD)), strict=False
-        ):
-            rows = np.repeat(self.number == run, SAMPLES)
+        for run, load in zip(np.unique(number)[1:], loads.reshape(-1, len(LOAD)), strict=False):
+            rows = np.repeat(number == run, SAMPLES)
             carried_only = np.zeros((robot.n_bodies, 10))
             carried_only.flat[10 * robot.n_bodies + LOAD] = load
             rigid[rows] += robot.inverse_dynamics(

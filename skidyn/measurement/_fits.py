@@ -194,6 +194,11 @@ class Fits:
         """Number of the recording of every row."""
         return self.signals.trajectory[::SAMPLES]
 
+    @property
+    def carrying(self) -> NDArray[np.int64]:
+        """The same as far as identified bodies include loads that differ between recordings."""
+        return self.recording if self.loads else np.zeros_like(self.recording)
+
     def average(self, values: Array) -> Array:
         """Mean of every row, from values at every sample."""
         rows = values.reshape(-1, SAMPLES, *values.shape[1:])
@@ -499,23 +504,47 @@ class Fits:
         if motion not in self._felt:
             self._felt.clear()
             robot, s = self._robot(motion), motion.motion(self.signals)
-            base = base_parameter_index(robot)
-            last = 10 * robot.n_bodies + LOAD if self.loads else LOAD[:0]
-            regressor = self.mean_regressor(robot, s, np.append(base, last))
+            n_base = len(base_parameter_index(robot))
             found = []
-            first = len(base) + OWN * self.n_joints
-            for j in range(self.n_joints):
-                felt = np.flatnonzero(regressor[:, j, : len(base)].any(axis=0))  # moved bodies
-                own = self._own_columns(motion, s, j)
-                columns = np.hstack([regressor[:, j][:, felt], own])
-                place = np.append(felt, len(base) + OWN * j + np.arange(OWN))
-                carried = by_recording(regressor[:, j, len(base) :], self.recording)
-                if carried.size and regressor[:, j, len(base) :].any():
+            first = n_base + OWN * self.n_joints
+            for j, (bodies, felt, carried) in enumerate(self.felt_bodies(robot, s)):
+                columns = np.hstack([bodies, self._own_columns(motion, s, j)])
+                place = np.append(felt, n_base + OWN * j + np.arange(OWN))
+                if carried.any():
                     columns = np.hstack([columns, carried])
                     place = np.append(place, first + np.arange(carried.shape[1]))
                 found.append((columns, place))
             self._felt[motion] = found
         return self._felt[motion]
+
+    def felt_bodies(
+        self, robot: Robot, s: Signals
+    ) -> Iterator[tuple[Array, NDArray[np.int64], Array]]:
+        """Mean columns of the bodies that every joint feels, and of their loads.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+        s : Signals
+            Its motion, ``SAMPLES`` samples a row.
+
+        Yields
+        ------
+        bodies : ndarray of shape (n_rows, n_felt)
+            Columns of base parameters, without those that the joint does not feel.
+        felt : ndarray of shape (n_felt,)
+            Numbers of these parameters.
+        loads : ndarray of shape (n_rows, n_loads)
+            Columns of the loads of recordings; none unless they are identified.
+        """
+        base = base_parameter_index(robot)
+        last = 10 * robot.n_bodies + LOAD if self.loads else LOAD[:0]
+        regressor = self.mean_regressor(robot, s, np.append(base, last))
+        for of_joint in regressor.transpose(1, 0, 2):
+            bodies, load = np.split(of_joint, [len(base)], axis=1)
+            felt = np.flatnonzero(bodies.any(axis=0))
+            yield bodies[:, felt], felt, by_recording(load, self.carrying)
 
     def mean_regressor(
         self,

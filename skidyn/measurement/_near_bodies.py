@@ -93,8 +93,7 @@ class NearBodies:
         read = [reading.torque_column(j) for j in range(fits.n_joints)]
         self.joints = [j for j, (column, _) in enumerate(read) if fits.usable(column)]
         self.inflation = [float(inflation[read[j][0]]) for j in self.joints]
-        number = fits.recording if fits.loads else 0 * fits.recording
-        self.n_loads = n_loads(number)
+        self.n_loads = n_loads(fits.carrying)
         self.n_bodies, self.size = stated.size, stated.size + 4 * len(self.joints) + self.n_loads
         self.rows: list[NDArray[np.bool_]] = []
         self.designs: list[Array] = []
@@ -111,7 +110,7 @@ class NearBodies:
             rubs = np.column_stack([rubs / (np.abs(rubs).max(axis=0) + 1e-12), np.ones(len(y))])
             moved = np.flatnonzero(own.any(axis=0))  # not by bodies before the joint
             load = gains[column] * regressor[:, j, LOAD] * likely_load(robot)[: len(LOAD)]
-            carried = by_recording(load, number)[use]
+            carried = by_recording(load, fits.carrying)[use]
             self.rows.append(use)
             self.designs.append(
                 np.hstack([(own * size)[:, moved], (np.std(y) + 1e-12) * rubs, carried])
