@@ -85,18 +85,17 @@ class CopiedTorque(Check):
 
 def copied_columns(measurement: Measurement) -> list[tuple[int, str, int]]:
     """Torques that equal another channel: joint, channel, and its joint, from 0."""
-    if measurement.copies is None:
-        s, torque = measurement.signals, measurement.torque
-        channels = {"torque": torque, "position": s.q, "velocity": s.dq}
-        joints = range(measurement.n_joints)
-        measurement.copies = [
-            (k, what, j)
-            for k in joints
-            for what, values in channels.items()
-            for j in joints
-            if not (what == "torque" and j >= k) and _is_line(values[:, j], torque[:, k])
-        ]
-    return measurement.copies
+    return measurement.once("copies", lambda: list(_copies(measurement)))
+
+
+def _copies(measurement: Measurement) -> Iterator[tuple[int, str, int]]:
+    s, torque = measurement.signals, measurement.torque
+    channels = {"torque": torque, "position": s.q, "velocity": s.dq}
+    for k in range(measurement.n_joints):
+        for what, values in channels.items():
+            for j in range(k if what == "torque" else measurement.n_joints):
+                if _is_line(values[:, j], torque[:, k]):
+                    yield k, what, j
 
 
 def _is_line(x: Array, y: Array) -> bool:

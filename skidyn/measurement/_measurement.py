@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,14 +28,13 @@ from skidyn.measurement._measures import (
 )
 
 if TYPE_CHECKING:
-    from skidyn.measurement._changes import Change
-    from skidyn.measurement._delay import Delay
     from skidyn.measurement._divided import Division
     from skidyn.measurement._fits import Fits
-    from skidyn.measurement._servo_limits import Servo
     from skidyn.robots import Robot
 
 
+#: What :meth:`Measurement.once` computes.
+_Made = TypeVar("_Made")
 #: Correlation of integrated velocity with position from which its slope is a scale, and largest
 #: difference of the slopes of joints with a common one.
 ALIKE, SHARED = 0.9, 0.05
@@ -69,9 +68,9 @@ class Measurement:
     same_stamps : int, optional
         Rows that had the time stamp of the previous row although joints moved; ``signals`` then
         have an even clock.
-    unsigned, changes, delay, copies, servos, late_position, readable, stale, lost, odd : optional
+    late_position, readable, stale, lost, odd, one_zero, dead, scaled, smoothed : optional
         Results of checks that are used by other checks; set by them.
-    one_zero, dead, scaled, smoothed, computed, frictionless, mixed : optional
+    computed, frictionless, mixed : optional
         Results of checks that are used by other checks; set by them.
     clock : float, optional
         Number of units of the clock in a second; set by its check.
@@ -99,11 +98,6 @@ class Measurement:
     identified: bool | None = None
     of_servos: bool = False
     same_stamps: int = 0
-    unsigned: tuple[list[int], dict[int, float]] | None = field(default=None, repr=False)
-    changes: list[Change] | None = field(default=None, repr=False)
-    delay: Delay | None = field(default=None, repr=False)
-    copies: list[tuple[int, str, int]] | None = field(default=None, repr=False)
-    servos: dict[int, Servo] | None = field(default=None, repr=False)
     late_position: float = field(default=0.0, repr=False)
     readable: bool = field(default=True, repr=False)
     stale: bool = field(default=False, repr=False)
@@ -126,6 +120,7 @@ class Measurement:
     leaps: Array = field(init=False, repr=False)
     #: Rows before which the clock has a gap that the motion does not have; it is closed.
     false_gaps: NDArray[np.intp] = field(init=False, repr=False)
+    _kept: dict[str, Any] = field(init=False, default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         self.recorded = self.signals
@@ -181,6 +176,27 @@ class Measurement:
         for name, value in vars(type(self)).items():
             if isinstance(value, cached_property):
                 self.__dict__.pop(name, None)
+        self._kept.clear()
+
+    def once(self, name: str, make: Callable[[], _Made]) -> _Made:
+        """Result of ``make`` that several checks use, computed at the first call.
+
+        Parameters
+        ----------
+        name : str
+            Name of the result.
+        make : callable
+            Function that computes it.
+
+        Returns
+        -------
+        object
+            What ``make`` returned; it must not be changed.
+        """
+        if name not in self._kept:
+            self._kept[name] = make()
+        made: _Made = self._kept[name]
+        return made
 
     @property
     def n_joints(self) -> int:

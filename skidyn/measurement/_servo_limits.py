@@ -104,11 +104,10 @@ class Servo:
 
 def servos_seen(measurement: Measurement) -> dict[int, Servo]:
     """Servos of the joints that move, by joint from 0."""
-    if measurement.servos is None:
-        fits = readable_fits(measurement) if measurement.of_servos else None
-        joints = [] if fits is None else [j for j in range(fits.n_joints) if fits.usable(j)]
-        measurement.servos = {j: _seen(fits, j) for j in joints if fits is not None}
-    return measurement.servos
+    fits = readable_fits(measurement) if measurement.of_servos else None
+    if fits is None:
+        return {}
+    return {j: _seen(fits, j) for j in range(fits.n_joints) if fits.usable(j)}
 
 
 def _seen(fits: Fits, j: int) -> Servo:

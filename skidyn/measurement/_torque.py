@@ -109,9 +109,7 @@ def unsigned_columns(measurement: Measurement) -> tuple[list[int], dict[int, flo
     A single column is found by a fit of the magnitude of the robot's torque; if no column of three
     or more is ever negative although all joints reverse, none has a sign.
     """
-    if measurement.unsigned is None:
-        measurement.unsigned = _unsigned(measurement)
-    return measurement.unsigned
+    return measurement.once("unsigned", lambda: _unsigned(measurement))
 
 
 def _unsigned(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
@@ -324,9 +322,9 @@ def _one_of_two(told: Suspicion, changes: Iterable[Change]) -> Suspicion:
 
 def asked_changes(measurement: Measurement, fits: Fits) -> list[Change]:
     """Changes to the reading of all recordings that the measurement implies."""
-    if measurement.changes is None:
-        measurement.changes = find_changes(fits.without(_lost_columns(measurement)))
-    return measurement.changes
+    return measurement.once(
+        "changes", lambda: find_changes(fits.without(_lost_columns(measurement)))
+    )
 
 
 def asked_gain(measurement: Measurement, fits: Fits) -> float:

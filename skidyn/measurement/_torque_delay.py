@@ -410,11 +410,12 @@ def late_joints(found: Delay, least: float = ALONE) -> list[int]:
 def measured_delay(measurement: Measurement) -> Delay | None:
     """Delay of the torque of a measurement; None without a robot or rows."""
     fits = readable_fits(measurement)
-    if fits is None:
-        return None
-    if measurement.delay is None:
-        measurement.delay = found = find_delay(fits.loaded())
-        for k in measurement.slow:  # held and interpolated values are always late or early
-            found.joints[k] = found.errors[k] = np.nan
-            found.gains[k] = 0.0
-    return measurement.delay
+    return None if fits is None else measurement.once("delay", lambda: _delay(measurement, fits))
+
+
+def _delay(measurement: Measurement, fits: Fits) -> Delay:
+    found = find_delay(fits.loaded())
+    for k in measurement.slow:  # held and interpolated values are always late or early
+        found.joints[k] = found.errors[k] = np.nan
+        found.gains[k] = 0.0
+    return found
