@@ -98,7 +98,15 @@ class MotorLoadFriction(Effect):
         self, motor: Array, external: Array, signals: Signals, joint: int, shape: Mapping[str, Any]
     ) -> Array:
         """Columns at given torques of the motor and from outside."""
-        return _columns(signals, joint, [np.abs(motor - external)])
+        sign = signals.sign[:, joint]
+        sizes = self._sizes(motor, external, signals, joint, shape)
+        return np.asanyarray(np.concatenate([(size * sign)[:, None] for size in sizes], axis=1))
+
+    def _sizes(
+        self, motor: Array, external: Array, signals: Signals, joint: int, shape: Mapping[str, Any]
+    ) -> list[Array]:
+        """The columns without the direction of motion."""
+        return [np.abs(motor - external)]
 
     def _external(self, signals: Signals, joint: int) -> Array:
         """External torque: minus that of the load without the inertial torque of the bodies."""
@@ -141,11 +149,11 @@ class StribeckLoadFriction(MotorLoadFriction):
     simplicity = 31
     rivals = ("motor_load_friction", "load_dependent_friction", "stribeck")
 
-    def _columns_at(
+    def _sizes(
         self, motor: Array, external: Array, signals: Signals, joint: int, shape: Mapping[str, Any]
-    ) -> Array:
+    ) -> list[Array]:
         fade, load = _fade(signals, joint, shape), np.abs(motor - external)
-        return _columns(signals, joint, [fade, load, fade * load])
+        return [fade, load, fade * load]
 
 
 class DirectionalLoadFriction(MotorLoadFriction):
@@ -169,11 +177,6 @@ class DirectionalLoadFriction(MotorLoadFriction):
     shapes = (*_SHARES, *_STRIBECK)
     simplicity = 32
     rivals = ("stribeck_load_friction", "load_dependent_friction", "stribeck")
-
-    def _columns_at(
-        self, motor: Array, external: Array, signals: Signals, joint: int, shape: Mapping[str, Any]
-    ) -> Array:
-        return _columns(signals, joint, self._sizes(motor, external, signals, joint, shape))
 
     def _sizes(
         self, motor: Array, external: Array, signals: Signals, joint: int, shape: Mapping[str, Any]
@@ -219,11 +222,6 @@ class QuadraticLoadFriction(DirectionalLoadFriction):
 def _fade(signals: Signals, joint: int, shape: Mapping[str, Any]) -> Array:
     speed = np.abs(signals.dq[:, joint]) / shape["vs"]
     return np.asanyarray(np.exp(-(speed ** shape["alpha"])))
-
-
-def _columns(signals: Signals, joint: int, sizes: Sequence[Array]) -> Array:
-    sign = signals.sign[:, joint]
-    return np.asanyarray(np.concatenate([(size * sign)[:, None] for size in sizes], axis=1))
 
 
 MOTOR_LOAD: tuple[type[MotorLoadFriction], ...] = (
