@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._delay import NEAR, Delay, JointFit
+from skidyn.measurement._delay import Delay
 from skidyn.measurement._fits import Fits
+from skidyn.measurement._joint_fit import NEAR, JointFit
 from skidyn.measurement._peak import peak
 from skidyn.measurement._robust import gains_of
 
@@ -76,9 +77,8 @@ def find_drift(fits: Fits, found: Delay) -> Drift | None:
         rivals.append(_refined(together, clock - clock.mean(), lag, growth)[2])
     if own - max(rivals) < LEAST:
         return None
-    here = together.fit(fits.torque_at(lag))
-    there = together.fit(fits.torque_at(middle + growth * (since - longest / 2)))
-    gains = tuple(gains_of(here, there))
+    there = together.fit_at(middle + growth * (since - longest / 2))
+    gains = tuple(gains_of(together.fit_at(lag), there))
     lag, growth = float(f"{middle - growth * longest / 2:.5f}"), float(f"{growth:.4g}")
     return Drift(lag, growth, gains)
 
@@ -121,7 +121,7 @@ def _at_peak(
     """Largest likelihood over one number that determines the lag, and that number."""
 
     def likelihood(value: float) -> float:
-        return together.likelihood(together.fits.torque_at(lag_of(value)))
+        return together.likelihood_at(lag_of(value))
 
     value = peak(likelihood, start, near)
     return likelihood(value), value

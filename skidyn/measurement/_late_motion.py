@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from skidyn._signals import Signals
-from skidyn.measurement._delay import JointFit
+from skidyn.measurement._joint_fit import JointFit
 from skidyn.measurement._peak import peak
 from skidyn.measurement._score import NEAR, SLOPE, Score, likeliest_lag
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn.measurement._check import Check
-from skidyn.measurement._delay import NEAR, JointFit
 from skidyn.measurement._fits import Fits
+from skidyn.measurement._joint_fit import NEAR, JointFit
 from skidyn.measurement._peak import climb, vertex
 from skidyn.measurement._robust import robust_likelihood
 from skidyn.measurement._suspicion import Suspicion, remedy_of
@@ -132,9 +132,6 @@ def lowpass_of_torque(fits: Fits, lag: float, late: Sequence[int]) -> tuple[floa
         rest = fits.average(left)
         return sum(robust_likelihood(rest[use, column]) for column, use in enumerate(together.rows))
 
-    def delayed(shift: float) -> float:
-        return together.likelihood(fits.torque_at(shift))
-
     def still_late(constant: float) -> float:
         """Lag of the torque without the low pass, by a parabola."""
         other = replace(fits, recorded=replace(source, torque=unfiltered(constant)))
@@ -144,6 +141,6 @@ def lowpass_of_torque(fits: Fits, lag: float, late: Sequence[int]) -> tuple[floa
         return float(np.clip(vertex(left, middle, right) or 0.0, -1, 1)) * NEAR
 
     constant, best = summit(filtered, [share * lag for share in TRIED])
-    _, other = summit(delayed, [share * lag for share in (0.8, 1.0, 1.2)])
+    _, other = summit(together.likelihood_at, [share * lag for share in (0.8, 1.0, 1.2)])
     # the delay of slow motion by a low pass is known better than its form
     return constant + still_late(constant), best - other

@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._delay import JointFit
 from skidyn.measurement._fits import Fits
+from skidyn.measurement._joint_fit import JointFit
 from skidyn.measurement._near_bodies import Factored
 from skidyn.measurement._peak import peak
 from skidyn.measurement._robust import RobustFit, robust_weights
@@ -83,7 +83,7 @@ class Score:
     def gain_of_torque(self, late: Sequence[int]) -> Callable[[float | Array], float]:
         """Log-likelihood gain as a function of the lag of some torques, s."""
         changed = self.together.changing(late)
-        return lambda lag: self.gain(changed.fit(self.fits.torque_at(lag)))
+        return lambda lag: self.gain(changed.fit_at(lag))
 
 
 def likeliest_lag(gain: Callable[[float], float], first: float) -> float:

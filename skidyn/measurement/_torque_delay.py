@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn.measurement._check import Check
-from skidyn.measurement._delay import Delay, RunDelay, find_delay, lag_gain, refined_lag
+from skidyn.measurement._delay import Delay, RunDelay, find_delay
 from skidyn.measurement._drift import Drift, find_drift
 from skidyn.measurement._fits import Fits
+from skidyn.measurement._joint_fit import lag_gain, refined_lag
 from skidyn.measurement._late_motion import LateMotion, find_late_motion
 from skidyn.measurement._late_run import LateRun, find_late_run
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
