@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import SIGN_BLUR, Array, Signals
+from skidyn._signals import Array, Signals
 from skidyn.measurement._loads import LOAD, by_recording, n_loads, span
 from skidyn.measurement._outcome import Outcome
 from skidyn.measurement._reading import Reading
@@ -343,10 +343,9 @@ class Fits:
         direction = math.copysign(1.0, motion.stretch)
         motion = replace(motion, zero=(), gravity=None, stretch=direction)
         if motion not in self._rubbed:
-            sign = np.tanh(s.dq / (SIGN_BLUR * s.unit))
             while len(self._rubbed) >= KEPT:
                 del self._rubbed[next(iter(self._rubbed))]
-            self._rubbed[motion] = [self.average(x) for x in (s.dq, sign, s.ddq)]
+            self._rubbed[motion] = [self.average(x) for x in (s.dq, s.sign, s.ddq)]
         return self._rubbed[motion]
 
     def _unstretched(self, motion: Reading, s: Signals) -> Signals:
@@ -565,9 +564,7 @@ class Fits:
 
 def friction(signals: Signals, joint: int) -> Array:
     """Columns of viscous and dry friction and of rotor inertia of a joint."""
-    dq = signals.dq[:, joint]
-    sign = np.tanh(dq / (SIGN_BLUR * signals.unit[joint]))
-    return np.column_stack([dq, sign, signals.ddq[:, joint]])
+    return np.column_stack([s[:, joint] for s in (signals.dq, signals.sign, signals.ddq)])
 
 
 def lines_between(position: Array) -> Array:

@@ -9,7 +9,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import SIGN_BLUR, Array, Signals
+from skidyn._signals import Array, Signals
 from skidyn.measurement._fits import SAMPLES, Fits, friction
 from skidyn.measurement._loads import LOAD, n_loads
 from skidyn.measurement._peak import peak
@@ -175,6 +175,6 @@ def own_columns(signals: Signals, joint: int) -> Array:
 def _bent_friction(signals: Signals, joint: int) -> Array:
     """Friction that falls or rises with speed; as viscous friction it would look like a lead."""
     speed = signals.dq[:, joint] / signals.unit[joint]
-    sign = np.tanh(speed / SIGN_BLUR)
+    sign = signals.sign[:, joint]
     falling = [sign * np.exp(-np.abs(speed) / slow) for slow in (0.03, 0.1, 0.3)]
     return np.column_stack([*falling, speed * np.abs(speed)])
