@@ -23,6 +23,7 @@ from skidyn._signals import Array, Signals
 from skidyn.measurement._loads import LOAD, by_recording, n_loads, span
 from skidyn.measurement._outcome import Outcome
 from skidyn.measurement._reading import Reading
+from skidyn.measurement._results import Results
 from skidyn.measurement._robust import (
     FEWEST,
     ROUNDS,
@@ -44,7 +45,7 @@ OWN = 4
 LOADED = 5.0
 #: Rows of a first test at least, and at most over the number of joints.
 FEWEST_ROWS, MOST_ROWS = 150, 2800
-#: Number of motions whose columns are cached.
+#: Number of motions whose columns are cached, since readings are tried one after another.
 KEPT = 2
 
 
@@ -91,19 +92,8 @@ class Fits:
     left_out: frozenset[int] = frozenset()
     backend: str = "numpy"
     loads: bool = False
-    _fewer: dict[frozenset[int], Fits] = field(default_factory=dict, repr=False)
-    _known: dict[Reading, Outcome] = field(default_factory=dict, repr=False)
-    _moved: dict[Reading, Array] = field(default_factory=dict, repr=False)
-    _rubbed: dict[Reading, list[Array]] = field(default_factory=dict, repr=False)
-    _carried: dict[tuple[Reading, int], Array] = field(default_factory=dict, repr=False)
-    _parts: dict[Reading, tuple[Array, Array]] = field(default_factory=dict, repr=False)
-    _fitted: dict[tuple[Reading, int], dict[tuple[int, int, float], RobustFit]] = field(
-        default_factory=dict, repr=False
-    )
-    _felt: dict[Reading, list[tuple[Array, NDArray[np.int64]]]] = field(
-        default_factory=dict, repr=False
-    )
-    _loaded: dict[Reading, Fits] = field(default_factory=dict, repr=False)
+    _of_motion: Results = field(default_factory=Results, repr=False)
+    _of_torque: Results = field(default_factory=Results, repr=False)
 
     @property
     def n_joints(self) -> int:
@@ -115,9 +105,7 @@ class Fits:
         left_out = self.left_out | frozenset(joints)
         if left_out == self.left_out:
             return self  # with all that was fitted so far
-        if left_out not in self._fewer:
-            self._fewer[left_out] = self._anew(left_out=left_out)
-        return self._fewer[left_out]
+        return self._of_torque.get("fewer", left_out, lambda: self._anew(left_out=left_out))
 
     def of(self, robot: Robot) -> Fits:
         """The same rows, for another robot with the same joints, which is only tried."""
@@ -149,12 +137,14 @@ class Fits:
         count = n_loads(self.signals.trajectory)
         if self.loads or not count:
             return self
-        reading = reading or Reading()
-        if reading not in self._loaded:
+        read = reading or Reading()
+
+        def loaded() -> Fits:
             other = self.with_loads()
-            gain = float(other.identified(reading).margin(self.identified(reading)).sum())
-            self._loaded[reading] = other if gain > LOADED * count else self
-        return self._loaded[reading]
+            gain = float(other.identified(read).margin(self.identified(read)).sum())
+            return other if gain > LOADED * count else self
+
+        return self._of_torque.get("loaded", read, loaded)
 
     def with_loads(self, loads: bool = True) -> Fits:
         """The same rows, with loads in any case, or without."""
@@ -162,7 +152,7 @@ class Fits:
 
     def with_torque(self, torque: Array) -> Fits:
         """The same rows with another torque, (n_samples, n_joints); what motion implies is kept."""
-        return replace(self, torque=torque, _fewer={}, _known={}, _fitted={}, _loaded={})
+        return replace(self, torque=torque, _of_torque=Results())
 
     def with_motion(self, signals: Signals) -> Fits:
         """The same rows and torque with another motion."""
@@ -246,7 +236,8 @@ class Fits:
         self, motion: Reading, read: Sequence[tuple[int, int, float]], rounds: int
     ) -> list[RobustFit]:
         """Fits of joints to columns of the torque; readings share most of these fits."""
-        known = self._fitted.setdefault((motion, rounds), {})
+        known: dict[tuple[int, int, float], RobustFit]
+        known = self._of_torque.get("joints", (motion, rounds), dict)
         new = [key for key in read if key not in known]
         if new:
             joints, columns, signs = (np.array(x) for x in zip(*new, strict=True))
@@ -279,15 +270,14 @@ class Fits:
         single round only selects readings, for which two samples of a row are enough.
         """
         samples = FEW_SAMPLES if rounds == 1 else range(SAMPLES)
-        key = motion, len(samples)
-        if key not in self._carried:
-            while len(self._carried) >= KEPT:
-                del self._carried[next(iter(self._carried))]
+
+        def columns_of_loads() -> Array:
             robot, s = self._robot(motion), motion.motion(self.signals)
             felt = self.mean_regressor(robot, s, 10 * robot.n_bodies + LOAD, samples)
             every = by_recording(felt.reshape(self.n_rows, -1), self.recording)
-            self._carried[key] = every.reshape(self.n_rows, -1, *felt.shape[1:])
-        carried = self._carried[key]
+            return every.reshape(self.n_rows, -1, *felt.shape[1:])
+
+        carried = self._of_motion.get("loads", (motion, len(samples)), columns_of_loads, KEPT)
         own, y = own.copy(), y.copy()
         for i, j in enumerate(joints.tolist()):
             load = carried[use[i], :, j].reshape(int(use[i].sum()), -1)
@@ -326,13 +316,12 @@ class Fits:
 
     def columns(self, motion: Reading) -> Array:
         """Mean columns of every joint, shape (n_rows, 4, n_joints)."""
-        if motion not in self._moved:
+
+        def columns() -> Array:
             s = motion.motion(self.signals)
-            parts = [self._own_torque(motion, s), *self._friction(motion, s)]
-            while len(self._moved) >= KEPT:  # readings are tried one after another
-                del self._moved[next(iter(self._moved))]
-            self._moved[motion] = np.stack(parts, axis=1)
-        return self._moved[motion]
+            return np.stack([self._own_torque(motion, s), *self._friction(motion, s)], axis=1)
+
+        return self._of_motion.get("columns", motion, columns, KEPT)
 
     def _friction(self, motion: Reading, s: Signals) -> list[Array]:
         """Mean columns of friction and rotor inertia, which no zero and no gravity changes.
@@ -342,11 +331,9 @@ class Fits:
         s = self._unstretched(motion, s)
         direction = math.copysign(1.0, motion.stretch)
         motion = replace(motion, zero=(), gravity=None, stretch=direction)
-        if motion not in self._rubbed:
-            while len(self._rubbed) >= KEPT:
-                del self._rubbed[next(iter(self._rubbed))]
-            self._rubbed[motion] = [self.average(x) for x in (s.dq, s.sign, s.ddq)]
-        return self._rubbed[motion]
+        return self._of_motion.get(
+            "friction", motion, lambda: [self.average(x) for x in (s.dq, s.sign, s.ddq)], KEPT
+        )
 
     def _unstretched(self, motion: Reading, s: Signals) -> Signals:
         """Motion of a reading without its other rate, which is that of friction in any case."""
@@ -379,25 +366,25 @@ class Fits:
         pulls : ndarray of shape (3, n_rows, n_joints)
         """
         motion = replace(motion.of_motion, gravity=None)
-        if motion not in self._parts:
+
+        def parts() -> tuple[Array, Array]:
             s = motion.motion(self.signals)
             robot, none = self.robot, (0.0, 0.0, 0.0)
             still = robot.inverse_dynamics(s.q, s.dq, s.ddq, gravity=none, backend="once")
             axes = map(tuple, np.eye(3))
             pulls = [robot.gravity_torque(s.q, gravity=axis, backend="once") for axis in axes]
-            self._parts.clear()
-            self._parts[motion] = self.average(still), np.array([self.average(p) for p in pulls])
-        return self._parts[motion]
+            return self.average(still), np.array([self.average(pull) for pull in pulls])
+
+        return self._of_motion.get("gravity", motion, parts, 1)
 
     def identified(self, reading: Reading) -> Outcome:
         """Fit with identified bodies, common to all joints."""
-        if reading not in self._known:
-            self._known[reading] = self._identified(reading)
-        return self._known[reading]
 
-    def _identified(self, reading: Reading) -> Outcome:
-        columns, designs, places, targets = self._designs(reading)
-        return Outcome.of(self.n_joints, columns, fit_together(designs, places, targets))
+        def outcome() -> Outcome:
+            columns, designs, places, targets = self._designs(reading)
+            return Outcome.of(self.n_joints, columns, fit_together(designs, places, targets))
+
+        return self._of_torque.get("identified", reading, outcome)
 
     def predicted_without(
         self, parts: Iterable[NDArray[np.bool_]]
@@ -500,11 +487,10 @@ class Fits:
 
         Those of the last motion are cached, since readings of the torque share them.
         """
-        if motion not in self._felt:
-            self._felt.clear()
+
+        def found() -> Iterator[tuple[Array, NDArray[np.int64]]]:
             robot, s = self._robot(motion), motion.motion(self.signals)
             n_base = len(base_parameter_index(robot))
-            found = []
             first = n_base + OWN * self.n_joints
             for j, (bodies, felt, carried) in enumerate(self.felt_bodies(robot, s)):
                 columns = np.hstack([bodies, self._own_columns(motion, s, j)])
@@ -512,9 +498,9 @@ class Fits:
                 if carried.any():
                     columns = np.hstack([columns, carried])
                     place = np.append(place, first + np.arange(carried.shape[1]))
-                found.append((columns, place))
-            self._felt[motion] = found
-        return self._felt[motion]
+                yield columns, place
+
+        return self._of_motion.get("felt", motion, lambda: list(found()), 1)
 
     def felt_bodies(
         self, robot: Robot, s: Signals

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from skidyn.measurement._measures import (
     position_step,
     velocity_consistency,
 )
+from skidyn.measurement._results import Results
 
 if TYPE_CHECKING:
     from skidyn.measurement._divided import Division
@@ -120,7 +121,7 @@ class Measurement:
     leaps: Array = field(init=False, repr=False)
     #: Rows before which the clock has a gap that the motion does not have; it is closed.
     false_gaps: NDArray[np.intp] = field(init=False, repr=False)
-    _kept: dict[str, Any] = field(init=False, default_factory=dict, repr=False)
+    _kept: Results = field(init=False, default_factory=Results, repr=False)
 
     def __post_init__(self) -> None:
         self.recorded = self.signals
@@ -176,7 +177,7 @@ class Measurement:
         for name, value in vars(type(self)).items():
             if isinstance(value, cached_property):
                 self.__dict__.pop(name, None)
-        self._kept.clear()
+        self._kept = Results()
 
     def once(self, name: str, make: Callable[[], _Made]) -> _Made:
         """Result of ``make`` that several checks use, computed at the first call.
@@ -193,10 +194,7 @@ class Measurement:
         object
             What ``make`` returned; it must not be changed.
         """
-        if name not in self._kept:
-            self._kept[name] = make()
-        made: _Made = self._kept[name]
-        return made
+        return self._kept.get(name, None, make)
 
     @property
     def n_joints(self) -> int:
