@@ -164,7 +164,7 @@ def find_axes(fits: Fits) -> list[Axis]:
     for body, axis in enumerate(tree.axes):
         for direction in every[np.abs(every @ axis) < 0.5]:
             read = few.of(turned(robot, body, direction)).nominal(Reading(), 1)
-            tried.append((float(read.margin(rough).sum()), len(tried), body, direction))
+            tried.append((read.gained_over(rough), len(tried), body, direction))
     here, before = fits.nominal(Reading()), fits.identified(Reading())
     most = CONSTANT * np.maximum(np.abs(fits.offsets(Reading())), here.scale)
     found = []

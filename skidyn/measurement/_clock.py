@@ -323,8 +323,7 @@ def _gained_by_torque(measurement: Measurement) -> float | None:
     if other is None or other.moving.shape != fits.moving.shape:
         return None
     other.moving = fits.moving  # likelihoods of the same rows
-    margin = other.identified(Reading()).margin(fits.identified(Reading()))
-    return float(margin.sum())
+    return other.identified(Reading()).gained_over(fits.identified(Reading()))
 
 
 class RepeatedRows(Check):

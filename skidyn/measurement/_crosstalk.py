@@ -100,7 +100,7 @@ def find_shares(measurement: Measurement, fits: Fits) -> list[Share]:
         judged = []
         for joint, source, share, error in tried:
             once, twice = (
-                float(without(fits, joint, source, x).identified(Reading()).margin(here).sum())
+                without(fits, joint, source, x).identified(Reading()).gained_over(here)
                 for x in (share, 2 * share)
             )
             if min(once, once - twice) > SURE:

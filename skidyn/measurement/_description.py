@@ -170,7 +170,7 @@ def _grams(robot: Robot, bodies: Sequence[int]) -> WrongUnit:
 def _gain(fits: Fits, robot: Robot) -> float:
     """Log-likelihood gain of another description with stated bodies."""
     here, there = fits.nominal(Reading()), fits.of(robot).nominal(Reading())
-    return float(there.margin(here).sum())
+    return there.gained_over(here)
 
 
 def _with_grams(fits: Fits, robot: Robot, found: list[WrongUnit]) -> list[WrongUnit]:

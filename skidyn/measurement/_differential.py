@@ -122,7 +122,7 @@ def find_differential(fits: Fits) -> Differential | None:
         there = fitted(share * mixed).identified(Reading())
         # the density of two torques is that of their combinations times the determinant
         spread = 0.5 * rows * np.log(2 * share**2) / max(there.inflation_of(k) for k in pair)
-        judged.append((float(there.margin(here).sum() + spread), share))
+        judged.append((there.gained_over(here) + spread, share))
     gain = max(judged)[0]
     if gain < SURE:
         return None

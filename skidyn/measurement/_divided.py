@@ -309,7 +309,7 @@ def _refined_zero(fits: Fits, tried: list[Tried]) -> Division | None:
         return _with_positions(fits, q)
 
     def margin(k: int, angle: float, out: NDArray[np.int64]) -> float:
-        return float(mended(k, angle, out).identified(Reading()).margin(here).sum())
+        return mended(k, angle, out).identified(Reading()).gained_over(here)
 
     value, k, angle, out = max(
         ((margin(*one[1:]), *one[1:]) for one in tried), key=lambda one: one[0]

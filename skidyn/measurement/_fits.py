@@ -141,7 +141,7 @@ class Fits:
 
         def loaded() -> Fits:
             other = self.with_loads()
-            gain = float(other.identified(read).margin(self.identified(read)).sum())
+            gain = other.identified(read).gained_over(self.identified(read))
             return other if gain > LOADED * count else self
 
         return self._of_torque.get("loaded", read, loaded)

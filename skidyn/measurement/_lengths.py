@@ -91,7 +91,7 @@ class Lengths(Check):
         if not SHARE < np.abs(found.factors).max() < FARTHEST:
             return
         plain = fits.identified(Reading())
-        confirmed = float(found.there.fits.identified(Reading()).margin(plain).sum())
+        confirmed = found.there.fits.identified(Reading()).gained_over(plain)
         if confirmed < CONFIRMED:
             return
         # arbitrary bodies include any payload

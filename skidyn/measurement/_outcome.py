@@ -57,6 +57,10 @@ class Outcome:
             change[column] /= (self if gained else other).inflation_of(column)
         return np.asarray(change)
 
+    def gained_over(self, other: Outcome) -> float:
+        """The same of all joints."""
+        return float(self.margin(other).sum())
+
     def inflation_of(self, column: int) -> float:
         """Overestimation of a likelihood due to correlated neighbouring rows; few are needed."""
         return self.fits[column].inflation if column in self.fits else 1.0

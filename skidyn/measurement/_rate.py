@@ -27,7 +27,7 @@ RATE_STEP, RATE_MOVES, RATE_WHOLE = 0.02, 0.2, 0.02
 def rate_gain(fits: Fits, rate: float, rounds: int = ROUNDS) -> float:
     """Log-likelihood gain of another rate of clock and velocities."""
     here, there = (fits.nominal(Reading(stretch=x), rounds) for x in (1.0, rate))
-    return float(there.margin(here).sum())
+    return there.gained_over(here)
 
 
 def other_rate(fits: Fits, odd: bool) -> float | None:
@@ -48,7 +48,7 @@ def other_rate(fits: Fits, odd: bool) -> float | None:
     gains = list(known_gains(fits, Reading(stretch=rate)).values())
     usual = odd and len(gains) > 1 and all(USUAL[0] <= gain <= USUAL[1] for gain in gains)
     here, there = (fits.identified(Reading(stretch=x)) for x in (1.0, rate))
-    confirmed = float(there.margin(here).sum()) > DECISIVE
+    confirmed = there.gained_over(here) > DECISIVE
     return _sharpened(fits, rate) if usual or confirmed else None
 
 

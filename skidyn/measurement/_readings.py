@@ -103,7 +103,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             if change.kind == "zero":
                 change = _refined(fits, change)
             there = fits.nominal(change.reading)
-            gain = float(there.margin(here).sum())
+            gain = there.gained_over(here)
             drop = _drop(here, there)
             judged.append(replace(change, gain=gain, untuned=rough_gain, drop=drop))
     judged = [
@@ -139,7 +139,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         if change.kind == "no_gravity":
             continue
         before = fits.identified(reading)
-        confirmed = float(fits.identified(change.reading).margin(before).sum())
+        confirmed = fits.identified(change.reading).gained_over(before)
         # stated bodies that are a little wrong make residuals alike over seconds, so that a short
         # log gains little by them whatever is read wrongly; identified ones then decide
         strong = change.gain >= LEAST or (confirmed >= DECISIVE and change.drop >= HALF)
@@ -180,7 +180,7 @@ def _screened(few: Fits, reading: Reading, changes: Iterator[Change]) -> list[tu
     tried = list(changes)
     for rows in (few.with_loads(False), few)[not few.loads :]:
         rough = rows.nominal(reading, SCREENED)
-        gains = [float(rows.nominal(c.reading, SCREENED).margin(rough).sum()) for c in tried]
+        gains = [rows.nominal(c.reading, SCREENED).gained_over(rough) for c in tried]
         if rows is few:
             break
         angles: dict[tuple[str, tuple[int, ...]], int] = {}
@@ -259,7 +259,7 @@ def _turned(fits: Fits, first: Change, accepted: list[Change]) -> Change:
         if _but_for_angle(first, zero):
             sharp = _sharpened(fits, zero.reading, zero.joints)
             there, here = (fits.identified(reading) for reading in (sharp, first.reading))
-            if float(there.margin(here).sum()) >= DECISIVE:
+            if there.gained_over(here) >= DECISIVE:
                 return replace(zero, reading=sharp)
     return first
 
@@ -342,7 +342,7 @@ def _sharpened(fits: Fits, reading: Reading, joints: Sequence[int]) -> Reading:
     felt = []
     for joint in joints:
         without = replace(reading, zero=tuple(z for z in reading.zero if z[0] != joint))
-        if float(here.margin(fits.identified(without)).sum()) >= NEEDED["zero"]:
+        if here.gained_over(fits.identified(without)) >= NEEDED["zero"]:
             felt.append(joint)
     for joint in (SWEEPS if len(felt) > 1 else 1) * felt:
         now = reading
@@ -440,6 +440,5 @@ def _restored_gain(fits: Fits, without: Reading, reading: Reading) -> tuple[floa
     """
     whole = fits.with_gravity(without).identified(replace(without, gravity=None))
     absent, present = fits.identified(without), fits.identified(reading)
-    restored = float(whole.margin(absent).sum())
-    held = (whole if restored > 0 else absent).margin(present)
-    return restored, float(held.sum())
+    restored = whole.gained_over(absent)
+    return restored, (whole if restored > 0 else absent).gained_over(present)

@@ -48,7 +48,7 @@ def find_size(fits: Fits, factors: Mapping[int, float]) -> tuple[float, float] |
     first = max(TRIED, key=lambda log: likelihood(few, float(log)))
     log = peak(lambda log: likelihood(fits, log), float(first), NEAR)
     there = sized(fits, log).identified(Reading())
-    gain = float(there.margin(fits.identified(Reading())).sum())
+    gain = there.gained_over(fits.identified(Reading()))
     scaled = fits.scaled({k: 1 / factor for k, factor in factors.items()})
     change = there.margin(scaled.identified(Reading()))
     for k, factor in factors.items():  # the density of a torque is that of the scaled one, times it

@@ -332,7 +332,7 @@ def unnamed_scale(measurement: Measurement, shared: float) -> bool:
 
 def gained(fits: Fits, reading: Reading) -> float:
     """Log-likelihood that a reading gains over the log as it is."""
-    return float(fits.nominal(reading).margin(fits.nominal(Reading())).sum())
+    return fits.nominal(reading).gained_over(fits.nominal(Reading()))
 
 
 def _fitted_size(
@@ -352,7 +352,7 @@ def _fitted_size(
     far = np.abs(np.arange(len(sizes)) - best) > 4
     other = sizes[far][int(np.argmax(likely[far]))]
     there, elsewhere = (fits.nominal(_sized(x, joints), 2) for x in (sizes[best], other))
-    sure = float(there.margin(elsewhere).sum()) > LEAST
+    sure = there.gained_over(elsewhere) > LEAST
     if not sure or not 0 < best < len(sizes) - 1:
         # beside a load or an effect, stated bodies with a scale of every torque decide little
         size, gain = _identified_size(fits, sizes, joints)
@@ -373,7 +373,7 @@ def _identified_size(
     best = int(np.argmax(likely))
     far = np.flatnonzero(np.abs(np.arange(len(sizes)) - best) > 4)
     other = int(far[np.argmax(likely[far])])
-    return float(sizes[best]), float(fitted[best].margin(fitted[other]).sum())
+    return float(sizes[best]), fitted[best].gained_over(fitted[other])
 
 
 def _gained_over_degrees(
@@ -388,7 +388,7 @@ def _gained_over_degrees(
         return 0.0
     fits = fits.loaded(_sized(ratio, joints))
     there, degrees = (fits.identified(_sized(x, joints)) for x in (ratio, 1 / DEGREE))
-    return float(there.margin(degrees).sum())
+    return there.gained_over(degrees)
 
 
 def _sized(size: float, joints: frozenset[int] | None) -> Reading:
