@@ -62,11 +62,8 @@ class HeldTorque(Check):
         shares, lost = np.zeros(measurement.n_joints), measurement.clipped
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
-            valued = moved & (torque[1:] != 0)  # zeros follow each other in a dead band
-            share = np.mean(torque[1:][valued] == torque[:-1][valued]) if valued.any() else 0.0
-            steps = _comes_in_steps(torque) and not _in_rhythm(torque, s.trajectory)
-            if k not in lost and share > HELD and not steps:
-                shares[k] = share
+            if k not in lost:  # zeros follow each other in a dead band
+                shares[k] = _share_held(torque, moved & (torque[1:] != 0), s.trajectory)
         held = np.flatnonzero(shares)
         if len(held):
             measurement.slow |= set(held.tolist())
@@ -77,6 +74,16 @@ class HeldTorque(Check):
                 "suspected",
                 [int(k) for k in held],
             )
+
+
+def _share_held(values: Array, moved: NDArray[np.bool_], trajectory: NDArray[np.int64]) -> float:
+    """Share of the steps of motion in which a channel holds its value; 0 if that is usual for it.
+
+    It is usual for a constant one, and for one in coarse steps that has no rhythm.
+    """
+    share = float(np.mean(values[1:][moved] == values[:-1][moved])) if moved.any() else 0.0
+    steps = _comes_in_steps(values) and not _in_rhythm(values, trajectory)
+    return share if share > HELD and not steps else 0.0
 
 
 def _comes_in_steps(values: Array) -> bool:
@@ -130,9 +137,7 @@ class HeldVelocity(Check):
             moved = s.within & (q[1:] != q[:-1]) & (dq[1:] != 0) & _accelerates(q)
             if not measurement.excited[k] or moved.sum() < 50:
                 continue
-            share = float(np.mean(dq[1:][moved] == dq[:-1][moved]))
-            steps = _comes_in_steps(dq) and not _in_rhythm(dq, s.trajectory)
-            if share > HELD and not steps:  # nor is it constant
+            if share := _share_held(dq, moved, s.trajectory):
                 shares[k] = share
         measurement.held_velocities = set(shares)
         if shares:
