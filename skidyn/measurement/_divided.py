@@ -306,7 +306,7 @@ def _refined_zero(fits: Fits, tried: list[Tried]) -> Division | None:
     def mended(k: int, angle: float, out: NDArray[np.int64]) -> Fits:
         q = fits.signals.q.copy()
         q[np.isin(fits.signals.trajectory, out), k] -= angle
-        return _with_positions(fits, q)
+        return fits.with_motion(fits.signals.with_(q=q))
 
     def margin(k: int, angle: float, out: NDArray[np.int64]) -> float:
         return mended(k, angle, out).identified(Reading()).gained_over(here)
@@ -393,11 +393,6 @@ def _likelihoods(
         after = [fit.likelihood for fit in fitted]
         total += (np.array(after) - before) / known.inflation_of(k)
     return total
-
-
-def _with_positions(fits: Fits, q: Array) -> Fits:
-    """The same rows with other positions, (n_samples, n_joints)."""
-    return fits.with_motion(fits.signals.with_(q=q))
 
 
 def _spread(values: Array) -> float:

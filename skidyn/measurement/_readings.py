@@ -390,14 +390,14 @@ def _all_gain(fits: Fits, change: Change, reading: Reading, here: Outcome) -> bo
     moved = [
         column
         for j in range(fits.n_joints)
-        if _columns(fits, change.reading, j) != _columns(fits, reading, j)
+        if _columns(change.reading, j) != _columns(reading, j)
         and fits.usable(column := change.reading.torque_column(j)[0])
     ]
     gains = there.margin(here)[moved]
     return bool(gains.sum() >= LEAST and np.all(gains > -LEAST))
 
 
-def _columns(fits: Fits, reading: Reading, joint: int) -> tuple[int, int]:
+def _columns(reading: Reading, joint: int) -> tuple[int, int]:
     """Columns of the motion and of the torque of a joint."""
     motion = joint if reading.order is None else reading.order[joint]
     return motion, reading.torque_column(joint)[0]

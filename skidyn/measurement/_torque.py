@@ -268,7 +268,7 @@ def _ordered(measurement: Measurement, final: Reading) -> tuple[str, tuple[str, 
     """Text for columns in another order, and the remedy."""
     every = range(measurement.n_joints)
     motion = [k + 1 for k in (final.order or every)]
-    torque = [final_column + 1 for final_column in _torque_order(final, every)]
+    torque = [final.torque_column(k)[0] + 1 for k in every]
     own = [k + 1 for k in every]
     orders = {"motion": motion, "tau": torque}
     moved = sorted(
@@ -282,12 +282,6 @@ def _ordered(measurement: Measurement, final: Reading) -> tuple[str, tuple[str, 
     called = {"motion": "positions and velocities", "tau": "torques"}
     said = listed([called[q] for q in orders])
     return f"the {said} of {names} are exchanged", remedy_of("order", orders)
-
-
-def _torque_order(reading: Reading, every: Iterable[int]) -> list[int]:
-    """Column of the torque of every joint."""
-    own = [k if reading.torque_order is None else reading.torque_order[k] for k in every]
-    return [k if reading.order is None else reading.order[k] for k in own]
 
 
 #: Meaning of another reading of the same joints.

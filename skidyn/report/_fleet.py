@@ -71,7 +71,8 @@ def summarize_fleet(
             "robot": name,
             "told": coefficient_told(alarm["column"]),
             "since": since_told(alarm["date"]),
-            **{**alarm, "date": str(alarm["date"])},
+            **alarm,
+            "date": str(alarm["date"]),
         }
         for name, report in watched.items()
         for alarm in report.alarms()
