@@ -15,16 +15,12 @@ from skidyn.effects._moments import moments, starts
 #: Temperature at which the derivatives are stated, in degrees Celsius.
 REFERENCE_TEMPERATURE = 30.0
 _BITTENCOURT = "Bittencourt, Wernholt, Sander-Tavallaey, Brogardh (2010), IROS, 4548-4554."
-
-
 #: Number of moments, spread over a log, from which friction may have changed.
 _CHANGES = 16
 #: Share of the recording before the last one in which a change that lasts is to be seen.
 _SHOWN = 0.02
 #: Ratio of the two time constants of a warm-up.
 _FASTER = 4.0
-#: Temperature ranges over which the dependence on temperature levels off, K.
-_LEVELLING = ({"levels_over": 6.0}, {"levels_over": 15.0})
 
 
 def _warmth(signals: Signals, joint: int, levels_over: float = np.inf) -> Array:
@@ -47,18 +43,28 @@ def _lasts(signals: Signals, since: float) -> bool:
     return bool(clock.min() < since < last - _SHOWN * length)
 
 
-def _constant_temperature(signals: Signals, joint: int) -> str | None:
-    if signals.temperature is not None and np.ptp(signals.temperature[:, joint]) < 0.5:
-        return f"the temperature of joint {joint + 1} changes by less than 0.5 degrees"
-    return None
-
-
 def _risen(times: Array) -> Array:
     """Share of a warm-up after some time constants; before its start it goes on as it began."""
     return np.where(times > 0, -np.expm1(-np.maximum(times, 0.0)), times)
 
 
-class TemperatureFriction(Effect):
+class _OverTemperature(Effect):
+    """An effect that changes with a logged temperature, and may level off exponentially."""
+
+    drawn_against = "temperature"
+    needs = ("temperature",)
+    shapes = (Shape("levels_over", "K", (), 1.5, 60.0, scales=False, has_interval=False),)
+    forms = ({"levels_over": 6.0}, {"levels_over": 15.0})
+    reference = _BITTENCOURT
+
+    def not_shown(self, signals: Signals, joint: int) -> str | None:
+        constant = None
+        if signals.temperature is not None and np.ptp(signals.temperature[:, joint]) < 0.5:
+            constant = f"the temperature of joint {joint + 1} changes by less than 0.5 degrees"
+        return super().not_shown(signals, joint) or constant
+
+
+class TemperatureFriction(_OverTemperature):
     """Viscous and Coulomb friction that change with a logged temperature.
 
     As with grease, it may level off exponentially over a range ``levels_over`` in K (Bittencourt,
@@ -66,7 +72,6 @@ class TemperatureFriction(Effect):
     """
 
     kind = "temperature_friction"
-    drawn_against = "temperature"
     title = "Temperature-dependent friction"
     formula = r"\left(\tfrac{dF_v}{dT}\dot q + \tfrac{dF_c}{dT}\mathrm{sign}\,\dot q\right)(T-T_0)"
     coefficients = (
@@ -74,28 +79,20 @@ class TemperatureFriction(Effect):
         Coefficient("dFc_dT", "N m/K"),
         Coefficient("d2Fv_dT2", "N m s/(rad K^2)"),
     )
-    needs = ("temperature",)
-    shapes = (Shape("levels_over", "K", (), 1.5, 60.0, scales=False, has_interval=False),)
-    forms = _LEVELLING
     simplicity = 14
     rivals = ("friction_drift", "temperature_offset")
     separating_motion = "the same sweep on the cold and on the warm robot"
-    reference = _BITTENCOURT
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         warm = _warmth(signals, joint, **shape)
         dq = signals.dq[:, joint]
         return np.column_stack([warm * dq, warm * signals.sign[:, joint], warm**2 * dq])
 
-    def not_shown(self, signals: Signals, joint: int) -> str | None:
-        return super().not_shown(signals, joint) or _constant_temperature(signals, joint)
 
-
-class TemperatureOffset(Effect):
+class TemperatureOffset(_OverTemperature):
     """Torque offset that changes with a logged temperature, and may level off exponentially."""
 
     kind = "temperature_offset"
-    drawn_against = "temperature"
     title = "Temperature-dependent offset"
     formula = r"\tfrac{d\tau}{dT}\,(T - T_0) + \tfrac{d^2\tau}{dT^2}\,(T - T_0)^2 + \tau_0"
     coefficients = (
@@ -103,20 +100,13 @@ class TemperatureOffset(Effect):
         Coefficient("d2tau_dT2", "N m/K^2"),
         Coefficient("tau0", "N m", is_zero=True),
     )
-    needs = ("temperature",)
-    shapes = (Shape("levels_over", "K", (), 1.5, 60.0, scales=False, has_interval=False),)
-    forms = _LEVELLING
     simplicity = 13
     rivals = ("offset", "temperature_friction")
     separating_motion = "one pose held or one sweep repeated while the robot warms up"
-    reference = _BITTENCOURT
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         warm = _warmth(signals, joint, **shape)
         return np.column_stack([warm, warm**2, np.ones(signals.n_samples)])
-
-    def not_shown(self, signals: Signals, joint: int) -> str | None:
-        return super().not_shown(signals, joint) or _constant_temperature(signals, joint)
 
 
 class FrictionDrift(Effect):
