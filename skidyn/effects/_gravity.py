@@ -46,7 +46,7 @@ class BaseTilt(Effect):
     ) -> dict[int, Array]:
         robot = signals.robot
         assert robot is not None
-        rest = np.zeros_like(signals.q)
+        rest = np.zeros_like(signals.q)  # the symbolic robot of a simulation has no gravity_torque
         parts = [
             robot.inverse_dynamics(
                 signals.q,

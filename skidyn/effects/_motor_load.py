@@ -113,6 +113,7 @@ class MotorLoadFriction(Effect):
         assert signals.load is not None
         if signals.robot is None:
             return np.asanyarray(-signals.load[:, joint])
+        # the symbolic robot of a simulation has no inertial_torque
         inertial = signals.robot.inverse_dynamics(
             signals.q,
             0.0 * signals.dq,
