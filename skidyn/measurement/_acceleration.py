@@ -9,8 +9,8 @@ import numpy as np
 
 from skidyn._signals import Signals
 from skidyn.measurement._check import Check
+from skidyn.measurement._consistency import velocity_consistency
 from skidyn.measurement._measurement import ALIKE, Measurement
-from skidyn.measurement._measures import velocity_consistency
 from skidyn.measurement._suspicion import Suspicion, names_in_option, remedy_of
 from skidyn.measurement._units import NEAR
 

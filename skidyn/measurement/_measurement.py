@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals, rates_of
 from skidyn._text import listed
+from skidyn.measurement._consistency import velocity_consistency
+from skidyn.measurement._leaps import find_leaps
 from skidyn.measurement._measures import (
     COARSE,
     channel_step,
     excited,
-    find_leaps,
     held_share,
     idle_rows,
     is_repeated,
     longest_plateau_share,
     missing_values,
     position_step,
-    velocity_consistency,
 )
 from skidyn.measurement._results import Results
 

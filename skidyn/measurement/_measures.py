@@ -17,17 +17,8 @@ STRIDE = 10
 CATCHES = 3.0
 #: Values among those that follow a change from which most are new, and not those of a few steps.
 RECURS = 0.5
-#: Windows over which velocity is compared with differentiated position, s.
-WINDOW = 0.05
-#: Correlation from which velocity is proportional to the rate of the position, the share of the
-#: windows that may be left out for it, and in how many rounds these are found.
-PROPORTIONAL, FEW, TRIMS = 0.98, 0.02, 3
 #: Least share of rows that hold all torques to be reported, and of those that hold any.
 HELD, AT_ONCE = 0.2, 0.7
-#: Least size of a jump of a position: as a multiple of its steps before and after, as a multiple of
-#: the deviation from even motion, and as a share of its range; most joined places,
-#: as a share of the rows.
-FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
 #: Share of zeros among torques above which zeros are normal; travel of a joint, as a share of its
 #: range, during which constant torques are not measured.
 MOSTLY_ZERO, IDLE_WAY = 0.3, 0.01
@@ -45,9 +36,8 @@ MORE_ZEROS = 2.0
 FEW_VALUES = 64
 #: Fewest values of a torque that is not coarse.
 FINE = 50
-#: Most steps that a position may be held before it catches up, and the share of the distance that
-#: its velocity implies by which it then moves on.
-CATCH_UP, CAUGHT = 5, 0.3
+#: Share of the distance that its velocity implies by which a position that was held moves on.
+CAUGHT = 0.3
 
 
 def position_step(position: np.ndarray) -> float:
@@ -329,58 +319,6 @@ def longest_plateau_share(torque: np.ndarray, segments: Sequence[slice]) -> floa
     return rows / len(torque)
 
 
-def velocity_consistency(
-    time: np.ndarray, position: np.ndarray, velocity: np.ndarray, segments: Sequence[slice]
-) -> tuple[float, float]:
-    """Slope and correlation of integrated velocity against change of position.
-
-    Both are taken over windows of 50 ms (in samples of the median step), which averages noise and
-    quantisation out. NaN where the joint does not move. A few windows are left out if all others
-    are proportional: a lost sample that is near the others is no outlier of the position.
-    """
-    x, y, _ = way_and_area(time, position, velocity, segments)
-    if x @ x < 1e-20 or y @ y < 1e-20:
-        return np.nan, np.nan
-    slope, likeness = _proportion(x, y)
-    trimmed = slope, likeness
-    for _ in range(TRIMS if likeness < PROPORTIONAL else 0):
-        left = np.abs(y - trimmed[0] * x)
-        kept = left <= np.quantile(left, 1 - FEW)
-        trimmed = _proportion(x[kept], y[kept])
-    return trimmed if trimmed[1] > PROPORTIONAL else (slope, likeness)
-
-
-def _proportion(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Slope of y on x through zero, and their correlation."""
-    xx, yy = float(x @ x) + 1e-300, float(y @ y) + 1e-300
-    return float(x @ y) / xx, float(x @ y) / np.sqrt(xx * yy)
-
-
-def way_and_area(
-    time: np.ndarray, position: np.ndarray, velocity: np.ndarray, segments: Sequence[slice]
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Change of position and integral of velocity over windows, and the median window in s.
-
-    Empty where there are no windows.
-    """
-    nothing = np.zeros(0)
-    steps = np.concatenate([np.diff(time[rows]) for rows in segments])
-    if len(steps) == 0:
-        return nothing, nothing, 0.0
-    window = int(np.clip(np.round(WINDOW / np.median(steps)), 1, 50))
-    change, integral = [], []
-    for rows in segments:
-        t, q, dq = time[rows], position[rows], velocity[rows]
-        if len(t) <= window:
-            continue
-        area = np.r_[0.0, np.cumsum((dq[1:] + dq[:-1]) / 2 * np.diff(t))]
-        change.append(q[window:] - q[:-window])
-        integral.append(area[window:] - area[:-window])
-    if not change:
-        return nothing, nothing, 0.0
-    return np.concatenate(change), np.concatenate(integral), window * float(np.median(steps))
-
-
 def excited(position: np.ndarray, velocity: np.ndarray, segments: Sequence[slice]) -> bool:
     """Whether a joint moves at all: more than 100 steps of noise, in both directions."""
     span = np.ptp(position)
@@ -396,78 +334,6 @@ def excited(position: np.ndarray, velocity: np.ndarray, segments: Sequence[slice
         ways = np.concatenate(parts)
         turns = reversals(ways, pieces) if len(ways) else 0
     return turns > 0
-
-
-def _held_before(moved: np.ndarray) -> np.ndarray:
-    """Number of steps without motion among the last ``CATCH_UP`` before every step."""
-    held = np.zeros(moved.shape, dtype=int)
-    still = np.ones(moved.shape, dtype=bool)
-    for back in range(1, CATCH_UP + 1):
-        still[:back] = False
-        still[back:] &= moved[:-back] == 0
-        held += still
-    return held
-
-
-def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
-    """Rows to which positions jump from the previous row and remain there.
-
-    Parameters
-    ----------
-    q : ndarray of shape (n_samples, n_joints), rad or m
-        Recorded positions.
-    time : ndarray of shape (n_samples,), s
-        Recorded clock.
-    trajectory : ndarray of shape (n_samples,)
-        Trajectory of every row.
-
-    Returns
-    -------
-    ndarray of int
-        Empty if no position jumps, or too many do for joined recordings.
-    """
-    n = len(q)
-    if n < 20:
-        return np.zeros(0, dtype=np.intp)
-    step = np.diff(time)
-    usual = float(np.median(step[step > 0])) if np.any(step > 0) else 1.0
-    together = (trajectory[1:] == trajectory[:-1]) & (step < 3 * usual) & (step > 0)
-    moved = np.where(together[:, None], np.diff(q, axis=0), 0.0)
-    far = np.zeros(moved.shape, dtype=bool)
-    for joint in range(moved.shape[1]):
-        far[:, joint] = _jumps(moved[:, joint], q[:, joint])
-    kept = []
-    for row in np.flatnonzero(far.any(axis=1) & together):
-        ends = np.array([max(0, row - 4), min(n - 1, row + 5)], dtype=np.intp)
-        if np.ptp(np.unique(trajectory[ends], return_inverse=True)[1]):
-            continue  # too close to the end of a trajectory for two parts
-        stay = []
-        for k in np.flatnonzero(far[row]):
-            before, after = q[max(0, row - 4) : row + 1, k], q[row + 1 : row + 6, k]
-            leap = abs(q[row + 1, k] - q[row, k])
-            stay.append(abs(np.median(after) - np.median(before)) > 0.5 * leap)
-        if any(stay):
-            kept.append(row + 1)
-    return np.array(kept if len(kept) <= max(PLACES * n, 2) else [], dtype=np.intp)
-
-
-def _jumps(moved: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Steps of a position that are far longer than those before and after."""
-    # not than by the recorded velocity, whose unit may be another
-    around = np.stack([np.roll(moved, shift) for shift in (-3, -2, -1, 1, 2, 3)])
-    most = np.abs(around).max(axis=0)
-    far = np.abs(moved) > FARTHER * most
-    if not far.any():
-        return np.asarray(far)  # as in most logs
-    # a position that was held catches up in one step
-    far &= np.abs(moved) > FARTHER * (1 + _held_before(moved)) * most
-    around.sort(axis=0)
-    beyond = np.abs(moved - (around[2] + around[3]) / 2)
-    far &= beyond > BEYOND * np.quantile(beyond, 0.995)
-    far &= beyond > RANGE * np.ptp(q)
-    turns = np.abs(moved - 2 * np.pi * np.round(moved / (2 * np.pi))) < 0.05 * 2 * np.pi
-    far &= ~(turns & (np.abs(moved) > np.pi))
-    return np.asarray(far)
 
 
 def divided_differences(values: np.ndarray, time: np.ndarray, order: int) -> np.ndarray:

@@ -9,8 +9,8 @@ import numpy as np
 
 from skidyn._signals import Array, Signals
 from skidyn.measurement._check import Check
+from skidyn.measurement._consistency import velocity_consistency
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import velocity_consistency
 from skidyn.measurement._suspicion import Suspicion
 
 #: Correlation of integrated velocity with position from which its slope is a scale, and below which

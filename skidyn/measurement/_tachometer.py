@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.measurement._measures import way_and_area
+from skidyn.measurement._consistency import way_and_area
 
 #: Fewest windows, largest share of the squared difference that may remain with a fault, and least
 #: offset, as a share of the root mean square velocity.

@@ -8,8 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from skidyn.measurement._check import Check
+from skidyn.measurement._consistency import velocity_consistency
 from skidyn.measurement._measurement import ALIKE, Measurement
-from skidyn.measurement._measures import step_share, velocity_consistency
+from skidyn.measurement._measures import step_share
 from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion, names_in_option, remedy_of
 from skidyn.measurement._tachometer import Fault, find_fault

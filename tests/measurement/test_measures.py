@@ -4,14 +4,13 @@
 import numpy as np
 
 from skidyn.measurement import (
-    find_leaps,
     is_held,
     is_repeated,
     position_step,
     rest_share,
     reversals,
 )
-from skidyn.measurement._measures import equal_values, velocity_consistency
+from skidyn.measurement._measures import equal_values
 
 TIME = np.arange(2000) * 0.01
 WAVE = np.sin(TIME)
@@ -35,23 +34,10 @@ def test_torques_that_are_held_together():
     assert is_held(held, np.ones(1999, dtype=bool)).mean() > 0.7
 
 
-def test_rest_reversals_and_leaps():
+def test_rest_and_reversals():
     assert rest_share(np.zeros(5)) == 1.0
     assert rest_share(np.cos(TIME)) < 0.01
     assert reversals(np.cos(TIME), [slice(0, 2000)]) == 6
-    leaping = WAVE[:, None].copy()
-    leaping[1200:] += 2.0
-    assert find_leaps(leaping, TIME, np.zeros(2000, dtype=int)).tolist() == [1200]
-
-
-def test_lost_samples_near_the_others_do_not_change_the_scale_of_a_velocity():
-    t = np.arange(0, 10, 0.01)
-    q = 0.1 + 0.05 * np.sin(2 * t)
-    lost = np.random.default_rng(0).random(len(t)) < 0.004
-    slope, likeness = velocity_consistency(
-        t, np.where(lost, 0.0, q), 0.1 * np.cos(2 * t), [slice(0, len(t))]
-    )
-    assert abs(slope - 1) < 0.02 and likeness > 0.98
 
 
 def test_parts_of_one_value_end_with_their_recording():

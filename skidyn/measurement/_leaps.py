@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Positions that jump and remain there, as where recordings were joined."""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: Least size of a jump of a position: as a multiple of its steps before and after, as a multiple of
+#: the deviation from even motion, and as a share of its range; most joined places,
+#: as a share of the rows.
+FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
+#: Most steps that a position may be held before it catches up.
+CATCH_UP = 5
+
+
+def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
+    """Rows to which positions jump from the previous row and remain there.
+
+    Parameters
+    ----------
+    q : ndarray of shape (n_samples, n_joints), rad or m
+        Recorded positions.
+    time : ndarray of shape (n_samples,), s
+        Recorded clock.
+    trajectory : ndarray of shape (n_samples,)
+        Trajectory of every row.
+
+    Returns
+    -------
+    ndarray of int
+        Empty if no position jumps, or too many do for joined recordings.
+    """
+    n = len(q)
+    if n < 20:
+        return np.zeros(0, dtype=np.intp)
+    step = np.diff(time)
+    usual = float(np.median(step[step > 0])) if np.any(step > 0) else 1.0
+    together = (trajectory[1:] == trajectory[:-1]) & (step < 3 * usual) & (step > 0)
+    moved = np.where(together[:, None], np.diff(q, axis=0), 0.0)
+    far = np.zeros(moved.shape, dtype=bool)
+    for joint in range(moved.shape[1]):
+        far[:, joint] = _jumps(moved[:, joint], q[:, joint])
+    kept = []
+    for row in np.flatnonzero(far.any(axis=1) & together):
+        ends = np.array([max(0, row - 4), min(n - 1, row + 5)], dtype=np.intp)
+        if np.ptp(np.unique(trajectory[ends], return_inverse=True)[1]):
+            continue  # too close to the end of a trajectory for two parts
+        stay = []
+        for k in np.flatnonzero(far[row]):
+            before, after = q[max(0, row - 4) : row + 1, k], q[row + 1 : row + 6, k]
+            leap = abs(q[row + 1, k] - q[row, k])
+            stay.append(abs(np.median(after) - np.median(before)) > 0.5 * leap)
+        if any(stay):
+            kept.append(row + 1)
+    return np.array(kept if len(kept) <= max(PLACES * n, 2) else [], dtype=np.intp)
+
+
+def _jumps(moved: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Steps of a position that are far longer than those before and after."""
+    # not than by the recorded velocity, whose unit may be another
+    around = np.stack([np.roll(moved, shift) for shift in (-3, -2, -1, 1, 2, 3)])
+    most = np.abs(around).max(axis=0)
+    far = np.abs(moved) > FARTHER * most
+    if not far.any():
+        return np.asarray(far)  # as in most logs
+    # a position that was held catches up in one step
+    far &= np.abs(moved) > FARTHER * (1 + _held_before(moved)) * most
+    around.sort(axis=0)
+    beyond = np.abs(moved - (around[2] + around[3]) / 2)
+    far &= beyond > BEYOND * np.quantile(beyond, 0.995)
+    far &= beyond > RANGE * np.ptp(q)
+    turns = np.abs(moved - 2 * np.pi * np.round(moved / (2 * np.pi))) < 0.05 * 2 * np.pi
+    far &= ~(turns & (np.abs(moved) > np.pi))
+    return np.asarray(far)
+
+
+def _held_before(moved: np.ndarray) -> np.ndarray:
+    """Number of steps without motion among the last ``CATCH_UP`` before every step."""
+    held = np.zeros(moved.shape, dtype=int)
+    still = np.ones(moved.shape, dtype=bool)
+    for back in range(1, CATCH_UP + 1):
+        still[:back] = False
+        still[back:] &= moved[:-back] == 0
+        held += still
+    return held
