@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from skidyn._signals import Array
 from skidyn._text import trajectories_told
 from skidyn.measurement._check import Check
+from skidyn.measurement._consistency import PROPORTIONAL
 from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._peak import climb
@@ -25,8 +26,6 @@ POSITIONS = {DEGREE: "deg", 2 * np.pi: "rev"}
 NAMES = {"deg": "degrees", "rev": "turns", "min": "minutes"}
 #: How far the slope may be off a unit's factor, and off 1.
 NEAR = 0.1
-#: Least correlation of velocities with the rates of positions that differ by a scale only.
-PROPORTIONAL = 0.98
 #: How nearly a slope is that of minutes, which are but 5 % from degrees.
 MINUTES = 0.02
 #: How many times its limit a position reaches that is suspicious, and that is no position.

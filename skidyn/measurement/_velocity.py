@@ -11,12 +11,14 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._consistency import velocity_consistency
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._measures import step_share
+from skidyn.measurement._odd_motion import LEAST_SPEED
 from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion, names_in_option, remedy_of
 from skidyn.measurement._tachometer import Fault, find_fault
 from skidyn.measurement._units import (
     CLOCKS,
     LEAST,
+    NAMES,
     NEAR,
     POSITIONS,
     VELOCITIES,
@@ -26,8 +28,8 @@ from skidyn.measurement._units import (
 )
 from skidyn.measurement._velocity_delay import common_lag, velocity_lags
 
-#: Range of a position, rad or m, and spread of a velocity, that are those of a joint that moves.
-LEAST_MOTION, LEAST_SPEED = 0.02, 0.02
+#: Range of a position, rad or m, that is that of a joint that moves.
+LEAST_MOTION = 0.02
 #: Correlation of a velocity with the rate of its position above which it has no fault.
 SURE = 0.995
 #: How much smaller a coarse velocity may be whose digits were cut, in steps over its spread.
@@ -172,7 +174,7 @@ class Velocity(Check):
         columns = names_in_option(quantity, joints, measurement.n_joints)
         remedy = remedy_of("units", dict.fromkeys(columns, unit))
         what = "velocities" if quantity == "dq" else "positions"
-        unit = {"deg": "degrees", "rev": "turns"}.get(unit, unit)
+        unit = NAMES.get(unit, unit)
         return self.suspicion(
             f"{what} look like {unit} on {names}",
             evidence,
