@@ -11,19 +11,18 @@ from skidyn._signals import Array
 from skidyn.evidence import broken_notes
 from skidyn.measurement._around_zero import dead_bands
 from skidyn.measurement._check import Check
-from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import COARSE, FEW_VALUES, channel_step, is_short, step_share
+from skidyn.measurement._measurement import NOTED_STEP, Measurement
+from skidyn.measurement._measures import COARSE, FEW_VALUES, is_short, step_share
 from skidyn.measurement._suspicion import Suspicion, remedy_of
 
 #: Share of rows at the extreme torque from which it is reported.
 CLIPPED = 0.002
 #: Fourth differences of a torque relative to its spread above which it has noise; joints of
 #: recordings with noise are never below 4e-4.
-NOISELESS, ENOUGH = 1e-5, 200
-#: Step of a velocity or torque, as a share of its spread, that is reported, and that of a torque
-#: that is suspected; how many times as often as the value next to it an extreme value of a coarse
-#: torque occurs if it is clipped.
-NOTED_STEP, LARGE_STEP, OFTENER = 0.1, 0.5, 3.0
+NOISELESS = 1e-5
+#: Step of a torque, as a share of its spread, that is suspected; how many times as often as the
+#: value next to it an extreme value of a coarse torque occurs if it is clipped.
+LARGE_STEP, OFTENER = 0.5, 3.0
 #: How many times as large a step of a velocity must be as that of differences of the positions.
 COARSER = 2.0
 
@@ -203,18 +202,6 @@ class CoarseTorque(Check):
             )
 
 
-def coarse_torques(measurement: Measurement) -> dict[int, tuple[float, float]]:
-    """Joints, from 0, whose torque comes in coarse steps: the step, and its share of the spread."""
-    found = {}
-    for k in range(measurement.n_joints):
-        torque = measurement.torque[:, k]
-        step = channel_step(torque)
-        share = step_share(torque, step)
-        if share > NOTED_STEP:
-            found[k] = (step, share)
-    return found
-
-
 class SmoothTorque(Check):
     """Torque without any noise: filtered before it was recorded, or computed."""
 
@@ -232,20 +219,6 @@ class SmoothTorque(Check):
                 "to this noise is not meaningful",
                 "noted",
             )
-
-
-def torque_scatter(measurement: Measurement) -> float:
-    """Largest scatter of a torque from sample to sample, as a share of its spread; inf if none."""
-    number, ratios = measurement.signals.trajectory, []
-    within = number[4:] == number[:-4]
-    if within.sum() < ENOUGH:
-        return np.inf
-    for torque in measurement.torque.T:
-        spread = float(np.median(np.abs(torque - np.median(torque))))
-        bend = np.abs(np.diff(torque, n=4))[within]
-        if spread > 0 and np.median(bend) > 0:
-            ratios.append(float(np.median(bend)) / spread / np.sqrt(70))
-    return max(ratios, default=np.inf)
 
 
 class BrokenSamples(Check):

@@ -25,6 +25,7 @@ from skidyn.measurement._measures import (
     longest_plateau_share,
     missing_values,
     position_step,
+    step_share,
 )
 from skidyn.measurement._results import Results
 
@@ -39,6 +40,10 @@ _Made = TypeVar("_Made")
 #: Correlation of integrated velocity with position from which its slope is a scale, and largest
 #: difference of the slopes of joints with a common one.
 ALIKE, SHARED = 0.9, 0.05
+#: Step of a velocity or torque, as a share of its spread, that is reported.
+NOTED_STEP = 0.1
+#: Fewest fourth differences of a torque that show its noise.
+ENOUGH = 200
 #: Share of the steps in which the position of a single joint is held.
 HELD_BY_ONE = 0.4
 #: Share of its range that a joint covers in a recording in which it moves.
@@ -409,16 +414,25 @@ class Measurement:
     @cached_property
     def coarse_torques(self) -> dict[int, tuple[float, float]]:
         """Joints, from 0, with torque in coarse steps: the step, and its share of the spread."""
-        from skidyn.measurement._channels import coarse_torques
-
-        return coarse_torques(self)
+        found = {}
+        for k, torque in enumerate(self.torque.T):
+            step = channel_step(torque)
+            share = step_share(torque, step)
+            if share > NOTED_STEP:
+                found[k] = (step, share)
+        return found
 
     @cached_property
     def torque_scatter(self) -> float:
-        """Largest scatter of a torque from sample to sample, as a share of its spread."""
-        from skidyn.measurement._channels import torque_scatter
-
-        return torque_scatter(self)
+        """Largest scatter of a torque between samples, as a share of its spread; inf if none."""
+        number, ratios = self.signals.trajectory, []
+        within = number[4:] == number[:-4]
+        for torque in self.torque.T if within.sum() >= ENOUGH else ():
+            spread = float(np.median(np.abs(torque - np.median(torque))))
+            bend = np.abs(np.diff(torque, n=4))[within]
+            if spread > 0 and np.median(bend) > 0:
+                ratios.append(float(np.median(bend)) / spread / np.sqrt(70))
+        return max(ratios, default=np.inf)
 
     @cached_property
     def clipped(self) -> list[int]:

@@ -76,14 +76,7 @@ def channel_step(values: np.ndarray) -> float:
 
 
 def step_share(values: np.ndarray, step: float) -> float:
-    """Step of a channel as a share of its standard deviation; 0 if it is not coarse, or constant.
-
-    Parameters
-    ----------
-    values : ndarray of shape (n_samples,)
-    step : float
-        As of :func:`channel_step`.
-    """
+    """Step of a channel as a share of its standard deviation; 0 if it has none, or is constant."""
     spread = float(values.std())
     return step / spread if np.isfinite(step) and spread else 0.0
 

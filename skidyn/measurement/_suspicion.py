@@ -72,30 +72,13 @@ def remedy_of(argument: str, value: Any) -> tuple[str, str]:
 
 
 def resample_to(rate: float) -> tuple[str, str]:
-    """The option, and the argument of ``read_log``, for another sampling rate, Hz.
-
-    Parameters
-    ----------
-    rate : float, Hz
-        Rounded as it is to be printed.
-    """
+    """The option, and the argument of ``read_log``, for a rounded sampling rate, Hz."""
     return f"--resample {rate:g}", f"resample_rate={rate:g}"
 
 
 def names_in_option(quantity: str, joints: Sequence[int], n_joints: int) -> list[str]:
     """Name of a quantity in an option if it is that of all joints, otherwise of its columns.
 
-    Parameters
-    ----------
-    quantity : str
-        Such as ``"dq"``.
-    joints : sequence of int
-        Joints, from 0.
-    n_joints : int
-        Number of all joints.
-
-    Examples
-    --------
     >>> names_in_option("dq", [0, 1], 2), names_in_option("dq", [1], 2)
     (['dq'], ['dq2'])
     """
