@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -45,47 +45,10 @@ class VelocityDelay(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         lags = velocity_lags(measurement)
         common, own = common_lag(measurement, lags)
-        if not own:
-            if np.isfinite(common):
-                yield from self._single(measurement, lags)
-            return
-        late, early = ("velocity", "position") if common > 0 else ("position", "velocity")
-        column = "dq" if common > 0 else "q"
-        value = float(f"{abs(_refined(measurement.signals, own)):.3g}")
-        if late == "position" and _in_time(measurement, value):
-            yield self.suspicion(
-                f"the velocity is early relative to the position by about {1e3 * value:g} ms, and "
-                "the torque is not",
-                f"at that lag it is the derivative of the position, equally in {len(own)} of "
-                f"{sum(map(np.isfinite, lags.values()))} moving joints, but bodies, friction and "
-                "rotor inertia explain the torque best at the time of the position: the velocity "
-                "was commanded or predicted, not measured",
-                "suspected",
-                remedy=remedy_of("derive", ["dq"]),
-            )
-            return
-        measurement.late_position = value if late == "position" else 0.0
-        constant = _lowpass(measurement.signals, own)
-        if constant is not None:
-            yield self._filtered(f"the {late}", early, column, constant)
-            return
-        yield self.suspicion(
-            f"the {late} is late relative to the {early} by about {1e3 * value:g} ms",
-            f"at that lag it is the derivative of the position, equally in {len(own)} of "
-            f"{sum(map(np.isfinite, lags.values()))} moving joints: it was filtered, or stamped by "
-            "another clock",
-            "suspected",
-            remedy=remedy_of("late", {column: value}),
-        )
-
-    def _filtered(
-        self, what: str, other: str, column: str, constant: float, joints: Iterable[int] = ()
-    ) -> Suspicion:
-        evidence = (
-            f"after undoing a first-order filter with a time constant of {1e3 * constant:.1f} ms "
-            f"it agrees with the {other}, far better than at any delay"
-        )
-        return suspect_lowpass(self, what, column, constant, evidence, joints)
+        if own:
+            yield self._late(measurement, common, own, sum(map(np.isfinite, lags.values())))
+        elif np.isfinite(common):
+            yield from self._single(measurement, lags)
 
     def _single(self, measurement: Measurement, lags: dict[int, float]) -> Iterator[Suspicion]:
         """Single joints with late or early velocity."""
@@ -95,34 +58,52 @@ class VelocityDelay(Check):
         if right < len(lags) / 2 or len(odd) > max(1, len(lags) / 3):
             return
         for k in odd:
-            value = float(f"{abs(_refined(measurement.signals, {k: lags[k]})):.3g}")
-            late, early = ("velocity", "position") if lags[k] > 0 else ("position", "velocity")
-            column = f"dq{k + 1}" if lags[k] > 0 else f"q{k + 1}"
-            if late == "position" and _in_time(measurement, value, k):
-                yield self.suspicion(
-                    f"the velocity of {measurement.joint(k)} is early relative to its position by "
-                    f"about {1e3 * value:g} ms, and its torque is not",
-                    "at that lag it is the derivative of the position, but the torque is in time "
-                    "with the position: the velocity was commanded or predicted, not measured",
-                    "suspected",
-                    [k],
-                    remedy_of("derive", [f"dq{k + 1}"]),
-                )
-                continue
-            constant = _lowpass(measurement.signals, {k: lags[k]})
-            if constant is not None:
-                what = f"the {late} of {measurement.joint(k)}"
-                yield self._filtered(what, early, column, constant, [k])
-                continue
-            yield self.suspicion(
-                f"the {late} of {measurement.joint(k)} is late relative to its {early} by about "
-                f"{1e3 * value:g} ms, but that of other joints is not",
-                "at that lag it is the derivative of the position: it was filtered, or stamped "
-                "by another clock",
+            yield self._late(measurement, lags[k], {k: lags[k]})
+
+    def _late(
+        self, measurement: Measurement, lag: float, own: dict[int, float], moving: int = 0
+    ) -> Suspicion:
+        """Late or early velocities: of joints with a common lag among moving ones, or of one."""
+        late, early = ("velocity", "position") if lag > 0 else ("position", "velocity")
+        value = float(f"{abs(_refined(measurement.signals, own)):.3g}")
+        joints: list[int] = [] if moving else list(own)
+        if moving:
+            number, of, its, alone = "", "", "the", ""
+            equally = f", equally in {len(own)} of {moving} moving joints"
+            in_time = "bodies, friction and rotor inertia explain the torque best at the time of"
+        else:
+            number, of, its = f"{joints[0] + 1}", f" of {measurement.joints(joints)}", "its"
+            equally, alone = "", ", but that of other joints is not"
+            in_time = "the torque is in time with"
+        column = f"{'dq' if late == 'velocity' else 'q'}{number}"
+        told = f"by about {1e3 * value:g} ms"
+        if late == "position" and _in_time(measurement, value, *joints):
+            return self.suspicion(
+                f"the velocity{of} is early relative to {its} position {told}, and {its} "
+                "torque is not",
+                f"at that lag it is the derivative of the position{equally}, but {in_time} the "
+                "position: the velocity was commanded or predicted, not measured",
                 "suspected",
-                [k],
-                remedy_of("late", {column: value}),
+                joints,
+                remedy_of("derive", [f"dq{number}"]),
             )
+        if moving and late == "position":
+            measurement.late_position = value
+        constant = _lowpass(measurement.signals, own)
+        if constant is not None:
+            evidence = (
+                f"after undoing a first-order filter with a time constant of {1e3 * constant:.1f} "
+                f"ms it agrees with the {early}, far better than at any delay"
+            )
+            return suspect_lowpass(self, f"the {late}{of}", column, constant, evidence, joints)
+        return self.suspicion(
+            f"the {late}{of} is late relative to {its} {early} {told}{alone}",
+            f"at that lag it is the derivative of the position{equally}: it was filtered, or "
+            "stamped by another clock",
+            "suspected",
+            joints,
+            remedy_of("late", {column: value}),
+        )
 
 
 def _in_time(measurement: Measurement, late: float, joint: int | None = None) -> bool:
