@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Broken samples: values that jump away from their neighbours and back.
+"""Broken samples: values that jump away from their neighbours and back, and torn motion.
 
 A dropped packet, a bus error or a reset register leaves one to three samples with wrong values.
 They are found by their distance from a running median (Hampel 1974, JASA 69), which a step of the
-torque at a reversal does not increase. They are left out of the rows, and the user is informed.
+torque at a reversal does not increase. Motion is torn where a position jumps, or where the logged
+velocity is for a moment not its derivative, as where all values of a packet are held, or at the
+ends of a recording that was filtered there. Such samples are left out of the rows, and the user is
+informed: one wrong acceleration may weigh more than a whole recording.
 """
 
 from __future__ import annotations
@@ -13,6 +16,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
+from skidyn._text import listed
+from skidyn.evidence._kinematics import smooth_motion
 from skidyn.evidence._rows import widened
 
 #: Samples of the running median; up to three of them may be broken.
@@ -24,6 +29,18 @@ FAR, TAILS = 3.0, (0.02, 0.98)
 TORQUE_SHARE, POSITION_SHARE = 0.25, 0.05
 #: and than this many steps of a coarse sensor; at rest such a sensor changes by one or two steps.
 STEPS = 5.0
+#: A position jumps where its distance from the line between its neighbours is more than this many
+#: times the median and the highest hundredth of all such distances, and this many steps of a coarse
+#: sensor,
+JUMP_OVER_MEDIAN, JUMP_OVER_TAIL, JUMP_STEPS = 30.0, 5.0, 3.0
+#: and more than this share of the same distance with neighbours that are so many samples away:
+#: it is 1/16 where the acceleration is constant, 1/4 where the velocity jumps, and 1 for a jump.
+JUMP_SHARE, JUMP_LAG = 0.5, 4
+#: A velocity is compared with the change of the position from so many samples before to as many
+#: after, and differs by more than this share of the range of velocities. Where the velocity jumps
+#: from one end of that range to the other, the difference is 1/20 of it. At the ends of a recording
+#: it is compared with that of the smoothed position, which shows more of what a filter did there.
+REACH, VELOCITY_SHARE = 5, 0.08
 
 
 def leaps(
@@ -120,10 +137,82 @@ def without_broken(motion: Signals, logged: Signals, torque: Array) -> Signals:
     """
     wrong, broken = _broken(logged, torque)
     # The torque of every joint depends on all positions.
-    position = np.asarray(broken.any(1))
+    position = np.asarray((broken | torn(logged)).any(1))
     if position.any():
         position = widened(position, max(1, motion.half_width))
     return motion.with_(valid=motion.usable & ~wrong & ~position[:, None])
+
+
+def torn(signals: Signals) -> NDArray[np.bool_]:
+    """Samples at which positions jump, or velocities are for a moment not their derivatives.
+
+    Parameters
+    ----------
+    signals : Signals
+        Logged motion with a clock.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_joints) of bool
+    """
+    found: NDArray[np.bool_] = signals.once(
+        "torn motion", lambda: _jumps(signals) | _other_velocity(signals)
+    )
+    return found
+
+
+def _jumps(signals: Signals) -> NDArray[np.bool_]:
+    """Samples at which a position leaves the line between its neighbours as no motion does."""
+    near, far = (_off_line(signals, lag) for lag in (1, JUMP_LAG))
+    least = np.maximum(
+        JUMP_OVER_MEDIAN * np.median(near, axis=0),
+        JUMP_OVER_TAIL * np.quantile(near, 0.99, axis=0),
+    )
+    jump = near > np.maximum(least, JUMP_SHARE * far)
+    if jump.any():
+        jump &= near > JUMP_STEPS * _smallest_change(signals.q)
+    return np.asarray(jump)
+
+
+def _off_line(signals: Signals, lag: int) -> Array:
+    """Distance of positions from the line between those some samples before and after.
+
+    It is 0 near the ends of a segment, where there is no such line.
+    """
+    distance = np.zeros_like(signals.q)
+    for rows in signals.segments:
+        q, clock = signals.q[rows], signals.clock[rows]
+        if len(q) <= 2 * JUMP_LAG:
+            continue
+        here = slice(JUMP_LAG, len(q) - JUMP_LAG)
+        before, after = (slice(here.start + way, here.stop + way) for way in (-lag, lag))
+        share = (clock[here] - clock[before]) / np.maximum(clock[after] - clock[before], 1e-300)
+        line = q[before] + share[:, None] * (q[after] - q[before])
+        distance[rows][here] = np.abs(q[here] - line)
+    return distance
+
+
+def _other_velocity(signals: Signals) -> NDArray[np.bool_]:
+    """Samples around which the logged velocity is not that with which the position changes."""
+    smoothed = signals.once("smooth motion", lambda: smooth_motion(signals))
+    off, end = np.zeros_like(signals.q), np.zeros(len(signals.q), dtype=bool)
+    for rows in signals.segments:
+        q, dq, clock = signals.q[rows], signals.dq[rows], signals.clock[rows]
+        moved = np.zeros_like(q)
+        np.cumsum((dq[1:] + dq[:-1]) / 2 * np.diff(clock)[:, None], axis=0, out=moved[1:])
+        place = np.arange(len(q))
+        before, after = np.maximum(place - REACH, 0), np.minimum(place + REACH, len(q) - 1)
+        time = np.maximum(clock[after] - clock[before], 1e-300)
+        off[rows] = ((q - moved)[after] - (q - moved)[before]) / time[:, None]
+        end[rows] = np.minimum(place, place[::-1]) < smoothed.half_width
+    off[end] = (signals.dq - smoothed.dq)[end]
+    low, high = np.quantile(off, TAILS, axis=0)
+    slowest, fastest = np.quantile(signals.dq, TAILS, axis=0)
+    least = np.maximum(FAR * (high - low), VELOCITY_SHARE * (fastest - slowest))
+    other = np.abs(off) > least
+    if other.any():
+        other &= np.abs(off) > JUMP_STEPS * _smallest_change(signals.q) * signals.rate / (2 * REACH)
+    return np.asarray(other)
 
 
 def _broken(signals: Signals, torque: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -163,8 +252,10 @@ def without_broken_positions(signals: Signals) -> Signals:
     return signals.with_(q=q)
 
 
-def broken_notes(signals: Signals, torque: Array, joint_names: tuple[str, ...]) -> list[str]:
-    """Messages about broken samples.
+def broken_notes(
+    signals: Signals, torque: Array, joint_names: tuple[str, ...]
+) -> list[tuple[str, str]]:
+    """What is wrong with broken samples, and which samples these are.
 
     Parameters
     ----------
@@ -177,8 +268,8 @@ def broken_notes(signals: Signals, torque: Array, joint_names: tuple[str, ...]) 
 
     Returns
     -------
-    list of str
-        A sentence for every joint and signal with broken samples.
+    list of (str, str)
+        The two parts of a sentence for every joint and signal with broken samples.
     """
     if signals.time is None:
         return []
@@ -189,9 +280,20 @@ def broken_notes(signals: Signals, torque: Array, joint_names: tuple[str, ...]) 
             rows = np.flatnonzero(broken[:, j])
             first = rows[0]
             near = np.median(values[max(0, first - WIDTH) : first + WIDTH, j])
-            count = f"{len(rows)} samples" if len(rows) > 1 else "1 sample"
-            notes.append(
-                f"The {what} of joint {j + 1} ({joint_names[j]}) has outliers in {count} (the "
-                f"first in row {first}: {values[first, j]:.4g} among {near:.4g}): left out."
-            )
+            where = f"{_counted(rows)}: {values[first, j]:.4g} among {near:.4g}); left out"
+            notes.append((f"the {what} of joint {j + 1} ({joint_names[j]}) has outliers", where))
+    # a broken position tears the motion around it, too
+    reach = max(1, signals.once("smooth motion", lambda: smooth_motion(signals)).half_width)
+    elsewhere = torn(signals) & ~widened(position, reach)
+    joints = np.flatnonzero(elsewhere.any(0))
+    if len(joints):
+        names = listed([f"joint {j + 1} ({joint_names[j]})" for j in joints])
+        where = f"{_counted(np.flatnonzero(elsewhere.any(1)))}); left out with their surroundings"
+        notes.append((f"the position of {names} jumps or disagrees with the velocity", where))
     return notes
+
+
+def _counted(rows: NDArray[np.intp]) -> str:
+    """Number of samples, and the first of them."""
+    count = f"{len(rows)} samples" if len(rows) > 1 else "1 sample"
+    return f"in {count} (the first in row {rows[0]}"

@@ -61,8 +61,8 @@ class Reading:
             signals = recognise(signals, self.recordings_)
         notes = broken_notes(signals, torque, self.robot_.joint_names)
         self._broken = bool(notes)
-        for note in notes:
-            warn_about_log(note)
+        for what, where in notes:
+            warn_about_log(f"{what[0].upper()}{what[1:]} {where}.")
         return signals, torque, order
 
     def _doubt_trajectories(self, numbers: NDArray[Any], column: int) -> None:

@@ -222,13 +222,12 @@ class SmoothTorque(Check):
 
 
 class BrokenSamples(Check):
-    """Single samples that jump away and back."""
+    """Few samples that jump away and back, or whose motion is torn."""
 
     name = "broken_samples"
-    suspects = "single outlying samples: lost packets, bus errors"
+    suspects = "few wrong samples: lost or held packets, bus errors, ends of a filtered recording"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         names = tuple(map(str, measurement.joint_names))
-        for note in broken_notes(measurement.signals, measurement.torque, names):
-            what, _, rest = note.rstrip(".").partition(" has outliers in ")
-            yield self.suspicion(f"{what[0].lower()}{what[1:]} has outliers", f"in {rest}", "noted")
+        for what, where in broken_notes(measurement.signals, measurement.torque, names):
+            yield self.suspicion(what, where, "noted")
