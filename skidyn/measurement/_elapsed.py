@@ -251,8 +251,10 @@ class LostRows(Check):
         self, measurement: Measurement, found: Elapsed, rows: NDArray[np.bool_]
     ) -> Iterator[Suspicion]:
         """Rows lost in bursts: a few long steps along the velocities, and no other odd ones."""
-        long = rows & found.fast & found.along & (found.steps > LONG)
-        others = rows & ~long & (np.abs(found.steps - 1) > 1 + WHOLE)
+        q, before = measurement.signals.q, found.index - 1
+        held = (before > 0) & np.all(q[before] == q[before - 1], axis=1)  # a held packet catches up
+        long = rows & ~held & found.fast & found.along & (found.steps > LONG)
+        others = rows & ~held & ~long & (np.abs(found.steps - 1) > 1 + WHOLE)
         if long.sum() < FEWEST_BURSTS or long.sum() < OTHERS * others.sum():
             return
         measurement.lost = True

@@ -45,6 +45,8 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
         ends = np.array([max(0, row - 4), min(n - 1, row + 5)], dtype=np.intp)
         if np.ptp(np.unique(trajectory[ends], return_inverse=True)[1]):
             continue  # too close to the end of a trajectory for two parts
+        if _was_held(moved, int(row)):
+            continue  # rows without new values, after which all joints are where they should be
         stay = []
         for k in np.flatnonzero(far[row]):
             before, after = q[max(0, row - 4) : row + 1, k], q[row + 1 : row + 6, k]
@@ -53,6 +55,17 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
         if any(stay):
             kept.append(row + 1)
     return np.array(kept if len(kept) <= max(PLACES * n, 2) else [], dtype=np.intp)
+
+
+def _was_held(moved: np.ndarray, row: int) -> bool:
+    """Whether a step makes up for the steps before, in which no joint moved."""
+    moving = np.flatnonzero(moved[:row].any(axis=1))
+    held = row - 1 - int(moving[-1]) if len(moving) else 0
+    if not held:
+        return False
+    start = row - held
+    around = np.abs(np.concatenate([moved[max(0, start - 3) : start], moved[row + 1 : row + 4]]))
+    return bool(np.all(np.abs(moved[row]) <= FARTHER * (1 + held) * around.max(axis=0)))
 
 
 def _jumps(moved: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -76,6 +76,17 @@ def test_rows_that_were_lost_in_bursts_under_an_even_clock():
     assert "in bursts" in told["lost_rows"].suspicion
 
 
+def test_packets_whose_values_were_held_are_neither_lost_rows_nor_joined_recordings():
+    held, values = FRAME.copy(), [c for c in FRAME if c not in ("time", "trajectory")]
+    for start in range(150, len(FRAME) - 100, 300):
+        held.loc[start : start + 10, values] = FRAME.loc[start, values].to_numpy()
+
+    told = told_of(held)
+
+    assert {"lost_rows", "joined"}.isdisjoint(told)
+    assert "disagrees with the velocity" in told["broken_samples"].suspicion
+
+
 def test_recordings_in_reversed_order():
     signals = [c for c in FRAME if c not in ("time", "trajectory")]
     frame = FRAME.copy()
