@@ -5,7 +5,10 @@ The noise of the torque is the part that changes faster than any motion. Third d
 residual remove everything that is smooth over four samples, such as torques that depend on the
 motion, and leave the sensor's noise. Their median magnitude is used, which few disturbed samples do
 not affect. Noise that is correlated over several samples is not included: the value is a lower
-bound, and the remainder is compared with a multiple of it. A torque in coarse steps hardly changes
+bound, and the remainder is compared with a multiple of it. A torque that a low-pass filter made
+smooth has no noise between neighbouring samples, but that which passed the filter between samples
+that are further apart: the differences then grow with their distance as those of a smooth curve do,
+up to the time constant of the filter, and hardly beyond it. A torque in coarse steps hardly changes
 from sample to sample; its noise is at least the error of rounding to these steps.
 """
 
@@ -20,6 +23,10 @@ from skidyn.measurement import channel_step, position_step
 GAIN = 20.0
 #: Median of the absolute value of a normal variable.
 MEDIAN = 0.6744897501960817
+#: Factor by which differences grow with twice the distance of the samples where these lie within
+#: the time constant of a filter, that of a smooth curve being 8; and the longest distance, s: a
+#: torque that depends on the motion changes within longer ones.
+SMOOTHED, LONGEST = 3.0, 0.04
 #: Samples in which steps of a torque are looked for, and how many of them there are at least for
 #: every value of a torque in coarse steps.
 LOOKED_AT, RECUR = 20_000, 10
@@ -72,18 +79,36 @@ def sensor_noise(signals: Signals, residual: Array, torque: Array | None) -> Arr
     ndarray of shape (n_joints,), N m or N
         0 if a torque is constant; NaN with fewer than four samples in a row.
     """
-    parts = [
-        np.diff(residual[rows], n=3, axis=0)
-        for rows in signals.segments
-        if rows.stop - rows.start > 3
-    ]
-    if not parts:
-        return np.full(residual.shape[1], np.nan)
-    size: Array = np.median(np.abs(np.concatenate(parts)), axis=0) / MEDIAN / np.sqrt(GAIN)
+    sizes = [_differences(signals, residual, 1)]
+    if np.isnan(sizes[0]).any():
+        return sizes[0]
+    size, smooth, distance = sizes[0].copy(), np.ones(len(sizes[0]), dtype=bool), 1
+    while smooth.any() and distance <= LONGEST * signals.rate:
+        sizes.append(_differences(signals, residual, 2 * distance))
+        if np.isnan(sizes[-1]).any():
+            break
+        ends = smooth & ~(sizes[-1] > SMOOTHED * sizes[-2])
+        size[ends] = sizes[-2][ends]
+        smooth &= ~ends
+        distance *= 2
     if torque is None:
         return size
     looked_at = torque[:: max(1, len(torque) // LOOKED_AT)]
     return np.asarray(np.maximum(size, [_rounding(channel) for channel in looked_at.T]))
+
+
+def _differences(signals: Signals, residual: Array, distance: int) -> Array:
+    """Standard deviation of white noise with such third differences; NaN without any."""
+    parts = []
+    for rows in signals.segments:
+        if rows.stop - rows.start > 3 * distance:
+            apart = residual[rows]
+            for _ in range(3):
+                apart = apart[distance:] - apart[:-distance]
+            parts.append(apart)
+    if not parts:
+        return np.full(residual.shape[1], np.nan)
+    return np.asarray(np.median(np.abs(np.concatenate(parts)), axis=0) / MEDIAN / np.sqrt(GAIN))
 
 
 def _rounding(channel: Array) -> float:

@@ -2,6 +2,8 @@
 """Noise of the torque sensor from what changes faster than any motion."""
 
 import numpy as np
+import pytest
+from scipy.signal import butter, sosfiltfilt
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
@@ -28,3 +30,18 @@ def test_it_contains_the_rounding_of_a_coarse_torque():
     found = diagnose(RBDRegressor(robot), log.X, np.round(log.y / step) * step)
     np.testing.assert_allclose(found.sensor_noise, step / np.sqrt(12), rtol=0.3)
     assert found.verdict == "complete" and not np.any(found.remainder > 2 * found.sensor_noise)
+
+
+@pytest.mark.parametrize("cutoff", [10.0, 20.0])
+def test_noise_that_passed_a_low_pass_filter_is_noise(complete_log, cutoff):
+    log, torque = complete_log, np.array(complete_log.y)
+    sos = butter(4, cutoff, fs=100.0, output="sos")
+    for number in np.unique(log.X["trajectory"]):
+        own = (log.X["trajectory"] == number).to_numpy()
+        torque[own] = sosfiltfilt(sos, torque[own], axis=0)
+    passed = log.noise_std * np.sqrt(cutoff / 50.0)
+
+    found = diagnose(RBDRegressor(log.robot), log.X, torque)
+
+    assert found.verdict == "complete"
+    assert np.all(np.abs(np.log(found.sensor_noise / passed)) < np.log(4.0))
