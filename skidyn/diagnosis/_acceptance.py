@@ -19,10 +19,19 @@ from skidyn.diagnosis._hypothesis import (
     in_part,
     removed_share,
     simplicity_of,
+    some_recordings,
     within_recordings,
 )
 from skidyn.diagnosis._ranking import RankingSearch
-from skidyn.diagnosis._rule import ALL_LEFT, IMITATED, NEARER, NEARLY, TAKEN_BACK
+from skidyn.diagnosis._rule import (
+    ALL_LEFT,
+    BEYOND_FORMULAS,
+    IMITATED,
+    NEARER,
+    NEARLY,
+    TAKEN_BACK,
+    Tester,
+)
 from skidyn.effects import NamelessEffect, get_effect
 from skidyn.evidence import weighted_least_squares
 
@@ -362,6 +371,8 @@ class JudgingSearch(RankingSearch):
         own, earlier = self._removed(self.left, hypothesis.gain), self.start - self.left
         if not self._mostly_small(joints, hypothesis.gain, own, tolerance * earlier):
             return False
+        if self._beyond_formulas(hypothesis):
+            return False
         # The error of an imperfect formula does not become noise by one known effect.
         known = hypothesis.kind != UNKNOWN and not within_recordings(hypothesis)
         most = self._mostly_small(joints, hypothesis.gain, own, 0.5 * self.left)
@@ -372,6 +383,55 @@ class JudgingSearch(RankingSearch):
         if several and not self._mostly_small(joints, hypothesis.gain, own, ALL_LEFT * self.left):
             return False
         return self._price(hypothesis.candidates) > settings.white
+
+    def _beyond_formulas(self, hypothesis: Hypothesis) -> bool:
+        """Whether no other formulas of the earlier effects could explain what an explanation does.
+
+        The error of a formula of positions is a function of the same positions, and that of
+        velocities one of velocities. Beside free functions of these, the explanation has to remain
+        significant, and to explain most of what it explains without them.
+        """
+        if within_recordings(hypothesis):
+            return False
+        free: dict[Candidate, None] = {}
+        for earlier in [*self.earlier, *self.findings]:
+            for candidate in earlier.candidates:
+                own = self._in_any_form(candidate)
+                if not own:
+                    return False
+                free.update(dict.fromkeys(own))
+        tester = self.tester(self.chosen)
+        beside = tester.beside([c.rows for c in free])
+        for candidate in hypothesis.candidates:
+            shares = [_removed_share(t, candidate) for t in (tester, beside)]
+            if shares[1] < BEYOND_FORMULAS * shares[0]:
+                return False
+            if not self.significant(beside.test(candidate.rows, candidate.zeros).chance, candidate):
+                return False
+        return True
+
+    def _in_any_form(self, candidate: Candidate) -> list[Candidate]:
+        """Free functions of the signals on which an effect depends, on the joints it reaches.
+
+        None for an effect that depends on other signals than positions, or velocities, of its
+        joints at the same moment.
+        """
+        term = candidate.term
+        signal = {"q": "q", "dq": "dq"}.get(term.effect.drawn_against, "")
+        plain = signal == "dq" or not term.is_dry
+        known = candidate.kind != UNKNOWN and term.effect.scope in ("joint", "pair")
+        always = not (some_recordings(candidate) or term.spans or term.course)
+        if not (signal and plain and known and always and term.is_pointwise):
+            return []
+        signals = {f"{signal}{j + 1}" for j in candidate.joints}
+        return [
+            c
+            for c in self.whole_pool
+            if c.kind == UNKNOWN
+            and c.variables
+            and signals.issuperset(c.variables)
+            and set(c.joints) <= set(candidate.rows)
+        ]
 
     def without_pieces(self, hypothesis: Hypothesis) -> tuple[Hypothesis, bool]:
         """The hypothesis without terms that are only parts of a force found before.
@@ -555,3 +615,9 @@ class JudgingSearch(RankingSearch):
                 if best.score - h.score < close
             ]
         return tuple(found)
+
+
+def _removed_share(tester: Tester, candidate: Candidate) -> float:
+    """Share of the squared error of its joints that a candidate removes beside a model."""
+    error = sum(float(tester.residual[j] @ tester.residual[j]) for j in candidate.rows)
+    return tester.estimate(candidate.rows)[1] / max(error, 1e-300)

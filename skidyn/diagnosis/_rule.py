@@ -91,6 +91,10 @@ TAKEN_BACK = 0.5
 #: imperfect formulas, though the rest is not white (``_acceptance.py``); and share of what a load
 #: in intervals removes above which it acts on a single joint (``_ranking.py``).
 ALL_LEFT = 0.9
+#: Share of the error that an explanation must remove beside free functions of the signals of
+#: earlier effects, over that without these, not to be an error of their formulas
+#: (``_acceptance.py``).
+BEYOND_FORMULAS = 0.5
 #: Of explanations that the data cannot separate, one is preferred with which the torque of the
 #: identified bodies differs from that of the described ones by less than this share of the others.
 NEARER = 0.5
