@@ -16,10 +16,12 @@ from skidyn.measurement._measures import MANY_MISSING, equal_values
 from skidyn.measurement._placeholder import CHANNELS, in_words, placeholder_remedy
 from skidyn.measurement._suspicion import Suspicion, exactly
 
-#: Most rows of a failed read. How many times as far as the values before and after it are from
-#: each other, and as nine tenths of the other steps of the channel, it is from both; the same as a
-#: share of the spread of the channel, against rounding errors beside zero.
-MOST_ROWS, AWAY, BEYOND, LARGE = 5, 3.0, 3.0, 0.01
+#: Most rows of a failed read; no joint jumps to a position and back, however long it stays there.
+MOST_ROWS = {"q": 50, "dq": 5, "tau": 5}
+#: How many times as far as the values before and after it are from each other, and as nine tenths
+#: of the other steps of the channel, it is from both; the same as a share of the spread of the
+#: channel, against rounding errors beside zero.
+AWAY, BEYOND, LARGE = 3.0, 3.0, 0.01
 #: Fewest such places with one value in a channel, in all channels, and in all channels to be
 #: certain. In none of 643 logs without failed reads, 31 of them recordings, a value has two.
 FEWEST, FEWEST_OF_ALL, SURE = 2, 3, 10
@@ -104,7 +106,7 @@ def failed_reads(measurement: Measurement) -> list[FailedRead]:
     columns = {(name, k): x for name, block in blocks.items() for k, x in enumerate(block.T)}
     places: dict[float, dict[tuple[str, int], NDArray[np.intp]]] = {}
     for channel, values in columns.items():
-        for value, begins in _placed(values, s.trajectory).items():
+        for value, begins in _placed(values, s.trajectory, MOST_ROWS[channel[0]]).items():
             places.setdefault(value, {})[channel] = begins
     found = []
     for value, own in places.items():
@@ -125,11 +127,16 @@ def failed_reads(measurement: Measurement) -> list[FailedRead]:
     return sorted(found, key=lambda read: -int(read.rows.sum()))
 
 
-def _placed(values: Array, trajectory: NDArray[np.int64]) -> dict[float, NDArray[np.intp]]:
-    """First rows of the places to which a channel jumps and from which it returns, by value."""
+def _placed(
+    values: Array, trajectory: NDArray[np.int64], longest: int
+) -> dict[float, NDArray[np.intp]]:
+    """First rows of the places to which a channel jumps and from which it returns, by value.
+
+    It stays there for at most so many rows.
+    """
     together = trajectory[1:] == trajectory[:-1]
     begins, ends = equal_values(values, trajectory)
-    inside = (begins > 0) & (ends < len(values)) & (ends - begins <= MOST_ROWS)
+    inside = (begins > 0) & (ends < len(values)) & (ends - begins <= longest)
     begins, ends = begins[inside], ends[inside]
     inside = together[begins - 1] & together[ends - 1]
     begins, ends = begins[inside], ends[inside]

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 #: Least size of a jump of a position: as a multiple of its steps before and after, as a multiple of
@@ -11,6 +13,9 @@ import numpy as np
 FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
 #: Most steps that a position may be held before it catches up.
 CATCH_UP = 5
+#: Most rows after which a position jumps back, and largest share of the jump that then remains: for
+#: this long, its values were wrong.
+AWAY, BACK = 50, 0.3
 
 
 def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
@@ -40,7 +45,7 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
     far = np.zeros(moved.shape, dtype=bool)
     for joint in range(moved.shape[1]):
         far[:, joint] = _jumps(moved[:, joint], q[:, joint])
-    kept = []
+    kept: list[int] = []
     for row in np.flatnonzero(far.any(axis=1) & together):
         ends = np.array([max(0, row - 4), min(n - 1, row + 5)], dtype=np.intp)
         if np.ptp(np.unique(trajectory[ends], return_inverse=True)[1]):
@@ -53,7 +58,12 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
             leap = abs(q[row + 1, k] - q[row, k])
             stay.append(abs(np.median(after) - np.median(before)) > 0.5 * leap)
         if any(stay):
-            kept.append(row + 1)
+            kept.append(int(row) + 1)
+    for first, then in pairwise(tuple(kept)):
+        joints = far[first - 1]
+        left = np.abs(q[then] - q[first - 1])[joints]
+        if then - first <= AWAY and np.all(left < BACK * np.abs(moved[first - 1, joints])):
+            kept = [row for row in kept if row not in (first, then)]
     return np.array(kept if len(kept) <= max(PLACES * n, 2) else [], dtype=np.intp)
 
 

@@ -121,6 +121,16 @@ def test_a_small_jump_of_a_position_is_found():
     assert "joint 1 (elbow) jumps or disagrees" in note and "row 699" in note
 
 
+def test_samples_between_a_jump_and_one_back_are_broken():
+    signals = swing()
+    q = signals.q.copy()
+    q[600:630] = 0.0
+
+    (note,) = notes(signals.with_(q=q), friction(signals))
+
+    assert "jumps" in note and int(note.split(" samples")[0].split()[-1]) >= 30
+
+
 def test_held_samples_are_found():
     signals = swing()
     held = np.arange(2000)

@@ -20,3 +20,10 @@ def test_a_position_that_remains_where_it_jumps():
 
 def test_a_position_that_returns_at_once_does_not_leap():
     assert leaps(np.sin(TIME) + 2.0 * (np.arange(2000) == 1200)) == []
+
+
+def test_a_position_that_is_wrong_for_a_moment_does_not_leap():
+    wave = np.sin(TIME)
+    wrong = (np.arange(2000) >= 1200) & (np.arange(2000) < 1210)
+    assert leaps(np.where(wrong, 1e-3 * wave, wave)) == []
+    assert leaps(wave + 2.0 * (np.arange(2000) >= 1200) - 1.0 * (np.arange(2000) >= 1210)) != []
