@@ -43,9 +43,10 @@ JUMP_SHARE, JUMP_LAG = 0.5, 4
 AWAY, BACK = 50, 0.3
 #: A velocity is compared with the change of the position from so many samples before to as many
 #: after, and differs by more than this share of the range of velocities. Where the velocity jumps
-#: from one end of that range to the other, the difference is 1/20 of it. At the ends of a recording
-#: it is compared with that of the smoothed position, which shows more of what a filter did there.
-REACH, VELOCITY_SHARE = 5, 0.08
+#: from one end of that range to the other, the difference is 1/24 of it. At the ends of a recording
+#: where it differs by this share of that limit, it is compared with that of the smoothed position,
+#: which shows more of what a filter did there.
+REACH, VELOCITY_SHARE, BENT = 6, 0.05, 0.5
 
 
 def leaps(
@@ -205,8 +206,7 @@ def _off_line(signals: Signals, lag: int) -> Array:
 
 def _other_velocity(signals: Signals) -> NDArray[np.bool_]:
     """Samples around which the logged velocity is not that with which the position changes."""
-    smoothed = signals.once("smooth motion", lambda: smooth_motion(signals))
-    off, end = np.zeros_like(signals.q), np.zeros(len(signals.q), dtype=bool)
+    off = np.zeros_like(signals.q)
     for rows in signals.segments:
         q, dq, clock = signals.q[rows], signals.dq[rows], signals.clock[rows]
         moved = np.zeros_like(q)
@@ -215,14 +215,19 @@ def _other_velocity(signals: Signals) -> NDArray[np.bool_]:
         before, after = np.maximum(place - REACH, 0), np.minimum(place + REACH, len(q) - 1)
         time = np.maximum(clock[after] - clock[before], 1e-300)
         off[rows] = ((q - moved)[after] - (q - moved)[before]) / time[:, None]
-        end[rows] = np.minimum(place, place[::-1]) < smoothed.half_width
-    off[end] = (signals.dq - smoothed.dq)[end]
     low, high = np.quantile(off, TAILS, axis=0)
-    slowest, fastest = np.quantile(signals.dq, TAILS, axis=0)
-    least = np.maximum(FAR * (high - low), VELOCITY_SHARE * (fastest - slowest))
-    other = np.abs(off) > least
+    least = np.maximum(FAR * (high - low), VELOCITY_SHARE * np.ptp(signals.dq, axis=0))
+    off = np.abs(off)
+    other = off > least
+    smoothed = signals.once("smooth motion", lambda: smooth_motion(signals))
+    apart = np.abs(signals.dq - smoothed.dq) > least
+    for rows in signals.segments:
+        for end in (slice(0, smoothed.half_width), slice(-smoothed.half_width, None)):
+            bent = off[rows][end].max(axis=0, initial=0.0) > BENT * least
+            other[rows][end] |= apart[rows][end] & bent
     if other.any():
-        other &= np.abs(off) > JUMP_STEPS * _smallest_change(signals.q) * signals.rate / (2 * REACH)
+        step = _smallest_change(signals.q) * signals.rate / (2 * REACH)
+        other &= np.maximum(off, np.abs(signals.dq - smoothed.dq)) > JUMP_STEPS * step
     return np.asarray(other)
 
 
