@@ -5,9 +5,9 @@
 
 Every case is a folder as for ``practice.py``. Each log is damaged in every way below, in a few
 moments of the motion or at the ends of its recordings, and diagnosed with default options. Counted
-are answers that are the same as those of the log as it was; those that, instead or in addition,
-tell an unknown or an intermittent torque; logs that are refused; and answers with the name of an
-effect that the log as it was does not have.
+are answers that are the same as those of the log as it was; those with a part of its names; those
+that, instead or in addition, tell an unknown or an intermittent torque; logs that are refused; and
+answers with the name of an effect that the log as it was does not have.
 """
 
 from __future__ import annotations
@@ -123,9 +123,12 @@ DAMAGES: tuple[Callable[[pd.DataFrame, np.random.Generator], None], ...] = (
 )
 
 
-def names(answered: dict) -> set[tuple[str, tuple[int, ...]]]:
-    """Effects and their joints."""
-    return {(e["kind"], tuple(e["joints"])) for e in answered["effects"]}
+def names(answered: dict) -> dict[str, set[int]]:
+    """Joints of every kind of effect."""
+    return {
+        kind: {j for e in answered["effects"] if e["kind"] == kind for j in e["joints"]}
+        for kind in {e["kind"] for e in answered["effects"]}
+    }
 
 
 def verdict(whole: dict, damaged: dict | None) -> str:
@@ -135,9 +138,9 @@ def verdict(whole: dict, damaged: dict | None) -> str:
     was, now = names(whole), names(damaged)
     if was == now:
         return "same"
-    if any(kind != "unknown" and (kind, joints) not in was for kind, joints in now):
+    if any(not joints <= was.get(kind, set()) for kind, joints in now.items() if kind != "unknown"):
         return "other name"
-    return "unknown"
+    return "part" if set(now) <= set(was) else "unknown"
 
 
 def main() -> None:
@@ -189,10 +192,10 @@ def main() -> None:
                 sure += sum(
                     e["kind"] != "unknown"
                     and (e["confidence"] or 0) >= 0.9
-                    and e["kind"] not in {kind for kind, _ in names(whole)}
+                    and e["kind"] not in names(whole)
                     for e in report["effects"]
                 )
-    kinds = ("same", "unknown", "refused", "other name")
+    kinds = ("same", "part", "unknown", "refused", "other name")
     print(f"{'damage':18s}" + "".join(f"{kind:>12s}" for kind in kinds))
     for damage in used:
         found = table[damage.__name__]

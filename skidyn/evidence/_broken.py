@@ -38,9 +38,8 @@ JUMP_OVER_MEDIAN, JUMP_OVER_TAIL, JUMP_STEPS = 30.0, 5.0, 3.0
 #: and more than this share of the same distance with neighbours that are so many samples away:
 #: it is 1/16 where the acceleration is constant, 1/4 where the velocity jumps, and 1 for a jump.
 JUMP_SHARE, JUMP_LAG = 0.5, 4
-#: Most samples after which a position jumps back, and largest share of the jump that then remains:
-#: the values between are wrong.
-AWAY, BACK = 50, 0.3
+#: Samples between two jumps that are no more than so many apart are wrong, too.
+AWAY = 50
 #: A velocity is compared with the change of the position from so many samples before to as many
 #: after, and differs by more than this share of the range of velocities. Where the velocity jumps
 #: from one end of that range to the other, the difference is 1/24 of it. At the ends of a recording
@@ -179,10 +178,7 @@ def _jumps(signals: Signals) -> NDArray[np.bool_]:
         jump &= near > JUMP_STEPS * _smallest_change(signals.q)
     for k in np.flatnonzero(jump.any(axis=0)):
         for last, first in pairwise(np.flatnonzero(jump[:, k])):
-            # the last sample of a jump, and the first one of the next: back, or on from there
-            before, there, after = signals.q[[last - 1, last, first], k]
-            if first - last <= AWAY and abs(after - before) < BACK * abs(there - before):
-                jump[last:first, k] = True
+            jump[last:first, k] |= first - last <= AWAY
     return np.asarray(jump)
 
 

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 #: Least size of a jump of a position: as a multiple of its steps before and after, as a multiple of
@@ -13,9 +11,9 @@ import numpy as np
 FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
 #: Most steps that a position may be held before it catches up.
 CATCH_UP = 5
-#: Most rows after which a position jumps back, and largest share of the jump that then remains: for
-#: this long, its values were wrong.
-AWAY, BACK = 50, 0.3
+#: Most rows after which a position jumps back to its course, and how many times as far as its steps
+#: around imply it may then be from where it left it: for this long, its values were wrong.
+AWAY, ONWARD = 50, 2.0
 
 
 def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
@@ -46,25 +44,42 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
     for joint in range(moved.shape[1]):
         far[:, joint] = _jumps(moved[:, joint], q[:, joint])
     kept: list[int] = []
+    back: set[int] = set()
     for row in np.flatnonzero(far.any(axis=1) & together):
+        joints = np.flatnonzero(far[row])
+        if row in back:
+            continue
+        same = slice(0, row + int(np.argmin(np.append(trajectory[row:] == trajectory[row], False))))
+        if ends_wrong := {end for k in joints if (end := _end_of_wrong(q[same, k], int(row)))}:
+            back |= ends_wrong
+            continue
         ends = np.array([max(0, row - 4), min(n - 1, row + 5)], dtype=np.intp)
         if np.ptp(np.unique(trajectory[ends], return_inverse=True)[1]):
             continue  # too close to the end of a trajectory for two parts
         if _was_held(moved, int(row)):
             continue  # rows without new values, after which all joints are where they should be
         stay = []
-        for k in np.flatnonzero(far[row]):
+        for k in joints:
             before, after = q[max(0, row - 4) : row + 1, k], q[row + 1 : row + 6, k]
             leap = abs(q[row + 1, k] - q[row, k])
             stay.append(abs(np.median(after) - np.median(before)) > 0.5 * leap)
         if any(stay):
             kept.append(int(row) + 1)
-    for first, then in pairwise(tuple(kept)):
-        joints = far[first - 1]
-        left = np.abs(q[then] - q[first - 1])[joints]
-        if then - first <= AWAY and np.all(left < BACK * np.abs(moved[first - 1, joints])):
-            kept = [row for row in kept if row not in (first, then)]
-    return np.array(kept if len(kept) <= max(PLACES * n, 2) else [], dtype=np.intp)
+    few = len(kept) + len(back) <= max(PLACES * n, 2)
+    return np.array(kept if few else [], dtype=np.intp)
+
+
+def _end_of_wrong(position: np.ndarray, row: int) -> int:
+    """Step with which a position returns to the course that it left with another one; 0 if none."""
+    step = np.abs(np.diff(position[max(0, row - 3) : row + AWAY + 4]))
+    first = min(row, 3)
+    before = step[:first].max(initial=0.0)
+    for end in range(first + 1, len(step) - 3):
+        around = max(before, step[end + 1 : end + 4].max())
+        way = abs(position[row + end - first + 1] - position[row])
+        if step[end] > FARTHER * around and way <= ONWARD * (end - first + 1) * around:
+            return row + end - first
+    return 0
 
 
 def _was_held(moved: np.ndarray, row: int) -> bool:
