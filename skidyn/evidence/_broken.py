@@ -34,7 +34,7 @@ STEPS = 5.0
 #: A position jumps where its distance from the line between its neighbours is more than this many
 #: times the median and the highest hundredth of all such distances, and this many steps of a coarse
 #: sensor,
-JUMP_OVER_MEDIAN, JUMP_OVER_TAIL, JUMP_STEPS = 30.0, 5.0, 3.0
+JUMP_OVER_MEDIAN, JUMP_OVER_TAIL, JUMP_STEPS = 30.0, 10.0, 3.0
 #: and more than this share of the same distance with neighbours that are so many samples away:
 #: it is 1/16 where the acceleration is constant, 1/4 where the velocity jumps, and 1 for a jump.
 JUMP_SHARE, JUMP_LAG = 0.5, 4
@@ -221,6 +221,10 @@ def _other_velocity(signals: Signals) -> NDArray[np.bool_]:
         for end in (slice(0, smoothed.half_width), slice(-smoothed.half_width, None)):
             bent = off[rows][end].max(axis=0, initial=0.0) > BENT * least
             other[rows][end] |= apart[rows][end] & bent
+    beside = np.zeros_like(other)
+    beside[1:] |= other[:-1]
+    beside[:-1] |= other[1:]
+    other &= beside  # a single sample is one of noise
     if other.any():
         step = _smallest_change(signals.q) * signals.rate / (2 * REACH)
         other &= np.maximum(off, np.abs(signals.dq - smoothed.dq)) > JUMP_STEPS * step
