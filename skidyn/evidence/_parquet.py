@@ -14,7 +14,7 @@ import numpy as np
 from skidyn._columns import Columns
 from skidyn._exceptions import LogError
 from skidyn._optional import import_optional
-from skidyn._signals import Array, Signals, signals_from
+from skidyn._signals import Array, Signals, rates_of, signals_from
 from skidyn.robots import Robot
 
 #: Number of rows that are decoded at once.
@@ -217,4 +217,7 @@ def _pieces(table: Array, key: int | None) -> Iterator[Array]:
 
 def _split(parts: list[Array], layout: _Layout, robot: Robot) -> tuple[Signals, Array]:
     table = parts[0] if len(parts) == 1 else np.vstack(parts)
-    return signals_from(table, layout.columns, robot), table[:, layout.torque]
+    signals = signals_from(table, layout.columns, robot)
+    if layout.columns.dq == layout.columns.q:  # no velocities recorded
+        signals = signals.with_(dq=rates_of(signals.q, signals.clock, signals.segments))
+    return signals, table[:, layout.torque]
