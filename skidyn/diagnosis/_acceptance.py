@@ -403,7 +403,7 @@ class JudgingSearch(RankingSearch):
         tester = self.tester(self.chosen)
         beside = tester.beside([c.rows for c in free])
         for candidate in hypothesis.candidates:
-            shares = [_removed_share(t, candidate) for t in (tester, beside)]
+            shares = [_share_of_error(t, candidate) for t in (tester, beside)]
             if shares[1] < BEYOND_FORMULAS * shares[0]:
                 return False
             if not self.significant(beside.test(candidate.rows, candidate.zeros).chance, candidate):
@@ -413,15 +413,14 @@ class JudgingSearch(RankingSearch):
     def _in_any_form(self, candidate: Candidate) -> list[Candidate]:
         """Free functions of the signals on which an effect depends, on the joints it reaches.
 
-        None for an effect that depends on other signals than positions, or velocities, of its
-        joints at the same moment.
+        There are none for an effect that depends on other signals than positions, or velocities, of
+        its joints at the same moment.
         """
-        term = candidate.term
-        signal = {"q": "q", "dq": "dq"}.get(term.effect.drawn_against, "")
-        plain = signal == "dq" or not term.is_dry
+        term, signal = candidate.term, candidate.term.effect.drawn_against
+        plain = signal == "dq" or (signal == "q" and not term.is_dry)
         known = candidate.kind != UNKNOWN and term.effect.scope in ("joint", "pair")
         always = not (some_recordings(candidate) or term.spans or term.course)
-        if not (signal and plain and known and always and term.is_pointwise):
+        if not (plain and known and always and term.is_pointwise):
             return []
         signals = {f"{signal}{j + 1}" for j in candidate.joints}
         return [
@@ -617,7 +616,7 @@ class JudgingSearch(RankingSearch):
         return tuple(found)
 
 
-def _removed_share(tester: Tester, candidate: Candidate) -> float:
+def _share_of_error(tester: Tester, candidate: Candidate) -> float:
     """Share of the squared error of its joints that a candidate removes beside a model."""
     error = sum(float(tester.residual[j] @ tester.residual[j]) for j in candidate.rows)
     return tester.estimate(candidate.rows)[1] / max(error, 1e-300)

@@ -79,18 +79,15 @@ def sensor_noise(signals: Signals, residual: Array, torque: Array | None) -> Arr
     ndarray of shape (n_joints,), N m or N
         0 if a torque is constant; NaN with fewer than four samples in a row.
     """
-    sizes = [_differences(signals, residual, 1)]
-    if np.isnan(sizes[0]).any():
-        return sizes[0]
-    size, smooth, distance = sizes[0].copy(), np.ones(len(sizes[0]), dtype=bool), 1
+    near = _differences(signals, residual, 1)
+    size, smooth, distance = near.copy(), np.isfinite(near), 1
     while smooth.any() and distance <= LONGEST * signals.rate:
-        sizes.append(_differences(signals, residual, 2 * distance))
-        if np.isnan(sizes[-1]).any():
-            break
-        ends = smooth & ~(sizes[-1] > SMOOTHED * sizes[-2])
-        size[ends] = sizes[-2][ends]
-        smooth &= ~ends
         distance *= 2
+        far = _differences(signals, residual, distance)
+        ends = smooth & (far <= SMOOTHED * near)  # not where recordings are too short
+        size[ends] = near[ends]
+        smooth &= ~ends
+        near = far
     if torque is None:
         return size
     looked_at = torque[:: max(1, len(torque) // LOOKED_AT)]
@@ -98,7 +95,10 @@ def sensor_noise(signals: Signals, residual: Array, torque: Array | None) -> Arr
 
 
 def _differences(signals: Signals, residual: Array, distance: int) -> Array:
-    """Standard deviation of white noise with such third differences; NaN without any."""
+    """Standard deviation of white noise with the third differences of samples so far apart.
+
+    Shape (n_joints,), N m or N; NaN without any.
+    """
     parts = []
     for rows in signals.segments:
         if rows.stop - rows.start > 3 * distance:

@@ -167,7 +167,7 @@ def torn(signals: Signals) -> NDArray[np.bool_]:
 
 
 def _jumps(signals: Signals) -> NDArray[np.bool_]:
-    """Samples at which a position leaves the line between its neighbours as no motion does."""
+    """Samples at which a position leaves the line between its neighbours, and those in between."""
     near, far = (_off_line(signals, lag) for lag in (1, JUMP_LAG))
     least = np.maximum(
         JUMP_OVER_MEDIAN * np.median(near, axis=0),
@@ -202,6 +202,32 @@ def _off_line(signals: Signals, lag: int) -> Array:
 
 def _other_velocity(signals: Signals) -> NDArray[np.bool_]:
     """Samples around which the logged velocity is not that with which the position changes."""
+    off = _velocity_error(signals)
+    low, high = np.quantile(off, TAILS, axis=0)
+    least = np.maximum(FAR * (high - low), VELOCITY_SHARE * np.ptp(signals.dq, axis=0))
+    off = np.abs(off)
+    other = off > least
+    smoothed = signals.once("smooth motion", lambda: smooth_motion(signals))
+    apart = np.abs(signals.dq - smoothed.dq)
+    for rows in signals.segments:
+        for end in (slice(0, smoothed.half_width), slice(-smoothed.half_width, None)):
+            bent = off[rows][end].max(axis=0, initial=0.0) > BENT * least
+            other[rows][end] |= (apart[rows][end] > least) & bent
+    beside = np.zeros_like(other)
+    beside[1:] |= other[:-1]
+    beside[:-1] |= other[1:]
+    other &= beside  # a single sample is one of noise
+    if other.any():
+        step = _smallest_change(signals.q) * signals.rate / (2 * REACH)
+        other &= np.maximum(off, apart) > JUMP_STEPS * step
+    return np.asarray(other)
+
+
+def _velocity_error(signals: Signals) -> Array:
+    """Change of the position around every sample minus that by the velocity, over the time of it.
+
+    Shape (n_samples, n_joints), rad/s or m/s.
+    """
     off = np.zeros_like(signals.q)
     for rows in signals.segments:
         q, dq, clock = signals.q[rows], signals.dq[rows], signals.clock[rows]
@@ -211,24 +237,7 @@ def _other_velocity(signals: Signals) -> NDArray[np.bool_]:
         before, after = np.maximum(place - REACH, 0), np.minimum(place + REACH, len(q) - 1)
         time = np.maximum(clock[after] - clock[before], 1e-300)
         off[rows] = ((q - moved)[after] - (q - moved)[before]) / time[:, None]
-    low, high = np.quantile(off, TAILS, axis=0)
-    least = np.maximum(FAR * (high - low), VELOCITY_SHARE * np.ptp(signals.dq, axis=0))
-    off = np.abs(off)
-    other = off > least
-    smoothed = signals.once("smooth motion", lambda: smooth_motion(signals))
-    apart = np.abs(signals.dq - smoothed.dq) > least
-    for rows in signals.segments:
-        for end in (slice(0, smoothed.half_width), slice(-smoothed.half_width, None)):
-            bent = off[rows][end].max(axis=0, initial=0.0) > BENT * least
-            other[rows][end] |= apart[rows][end] & bent
-    beside = np.zeros_like(other)
-    beside[1:] |= other[:-1]
-    beside[:-1] |= other[1:]
-    other &= beside  # a single sample is one of noise
-    if other.any():
-        step = _smallest_change(signals.q) * signals.rate / (2 * REACH)
-        other &= np.maximum(off, np.abs(signals.dq - smoothed.dq)) > JUMP_STEPS * step
-    return np.asarray(other)
+    return off
 
 
 def _broken(signals: Signals, torque: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -70,15 +70,17 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
 
 
 def _end_of_wrong(position: np.ndarray, row: int) -> int:
-    """Step with which a position returns to the course that it left with another one; 0 if none."""
-    step = np.abs(np.diff(position[max(0, row - 3) : row + AWAY + 4]))
-    first = min(row, 3)
-    before = step[:first].max(initial=0.0)
-    for end in range(first + 1, len(step) - 3):
-        around = max(before, step[end + 1 : end + 4].max())
-        way = abs(position[row + end - first + 1] - position[row])
-        if step[end] > FARTHER * around and way <= ONWARD * (end - first + 1) * around:
-            return row + end - first
+    """Step with which a position returns to the course that it left with step ``row``; 0 if none.
+
+    A step is that from the row of its number to the next one.
+    """
+    before = np.abs(np.diff(position[max(0, row - 3) : row + 1])).max(initial=0.0)
+    step = np.abs(np.diff(position[row : row + AWAY + 4]))
+    for later in range(1, len(step) - 3):
+        around = max(before, step[later + 1 : later + 4].max())
+        way = abs(position[row + later + 1] - position[row])
+        if step[later] > FARTHER * around and way <= ONWARD * (later + 1) * around:
+            return row + later
     return 0
 
 
