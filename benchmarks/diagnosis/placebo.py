@@ -18,7 +18,7 @@ import numpy as np
 from scipy.stats import norm
 
 from skidyn._signals import read_signals
-from skidyn.diagnosis._rule import Tester
+from skidyn.diagnosis._tester import Tester
 from skidyn.effects import Term, get_effect, make_terms
 from skidyn.evidence import make_problem
 from skidyn.logs import load_recording

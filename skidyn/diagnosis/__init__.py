@@ -37,6 +37,7 @@ __all__ = [
 ]
 
 # For other packages of skidyn; no part of the public interface.
+from skidyn.diagnosis._blocks import variance_inflation as variance_inflation
 from skidyn.diagnosis._candidates import (
     Candidate as Candidate,
     catalogue_candidates as catalogue_candidates,
@@ -52,7 +53,6 @@ from skidyn.diagnosis._findings import notes as notes
 from skidyn.diagnosis._intervals import parameter_intervals as parameter_intervals
 from skidyn.diagnosis._profile import refine as refine
 from skidyn.diagnosis._remainder import noise_level as noise_level
-from skidyn.diagnosis._rule import variance_inflation as variance_inflation
 from skidyn.diagnosis._screen import CANDIDATE_RIDGE as CANDIDATE_RIDGE
 from skidyn.diagnosis._spectrum import find_lines as find_lines
 from skidyn.diagnosis._split import split_effects as split_effects

@@ -29,8 +29,9 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn.diagnosis._hypothesis import UNKNOWN, SearchResult
-from skidyn.diagnosis._rule import CHANGE_INSTEAD, CHANGE_LEVEL, CHANGE_PARTS, Tester
+from skidyn.diagnosis._rule import CHANGE_INSTEAD, CHANGE_LEVEL, CHANGE_PARTS
 from skidyn.diagnosis._search_state import replace_torque
+from skidyn.diagnosis._tester import Tester
 from skidyn.diagnosis._variables import average_at_rows
 from skidyn.effects import Term
 from skidyn.evidence import Problem

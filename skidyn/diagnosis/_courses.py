@@ -18,7 +18,8 @@ from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._parts import PartScan, n_parts
 from skidyn.diagnosis._recordings import everywhere
-from skidyn.diagnosis._rule import COURSE_ROUNDS, Tester
+from skidyn.diagnosis._rule import COURSE_ROUNDS
+from skidyn.diagnosis._tester import Tester
 from skidyn.effects import get_effect
 from skidyn.evidence import Problem
 

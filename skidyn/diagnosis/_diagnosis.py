@@ -20,6 +20,7 @@ from skidyn._memory import give_back
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
 from skidyn.diagnosis._beginnings import look_after_beginnings
+from skidyn.diagnosis._blocks import block_length, time_blocks, variance_inflation
 from skidyn.diagnosis._conclusion import conclude
 from skidyn.diagnosis._confidence import in_doubt
 from skidyn.diagnosis._correction import is_physics, open_model
@@ -28,12 +29,7 @@ from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._limits import Gates, Limit, find_limits, without_withdrawn
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._reversals import look_at_reversals
-from skidyn.diagnosis._rule import (
-    Settings,
-    block_length,
-    time_blocks,
-    variance_inflation,
-)
+from skidyn.diagnosis._rule import Settings
 from skidyn.diagnosis._search import search
 from skidyn.diagnosis._servo_settings import (
     Servos,

@@ -15,7 +15,8 @@ from scipy.special import ndtri
 from skidyn._signals import Array
 from skidyn._text import inside
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.diagnosis._rule import Settings, degrees_of_freedom, least_significant
+from skidyn.diagnosis._chance import degrees_of_freedom, least_significant
+from skidyn.diagnosis._rule import Settings
 from skidyn.effects import get_effect, searched_kinds
 from skidyn.evidence import (
     Felt,

@@ -26,7 +26,8 @@ from scipy.special import gammaln
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, rows_within
-from skidyn.diagnosis._rule import ROUNDS, Tester
+from skidyn.diagnosis._rule import ROUNDS
+from skidyn.diagnosis._tester import Tester
 from skidyn.evidence import Problem
 
 #: Fewest recordings of which a part is looked for, and fewest recordings of a part: a single one

@@ -28,20 +28,13 @@ from skidyn.diagnosis._hypothesis import (
 from skidyn.diagnosis._parts import part_candidates
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recordings import DRIFT, FRICTION, choose, drifting, own_friction
-from skidyn.diagnosis._rule import (
-    ALL_LEFT,
-    FEW_WAVES,
-    MASKED,
-    NEARLY,
-    RESOLVED,
-    ROUNDS,
-    Tester,
-)
+from skidyn.diagnosis._rule import ALL_LEFT, FEW_WAVES, MASKED, NEARLY, RESOLVED, ROUNDS
 from skidyn.diagnosis._screen import Model, Screen
 from skidyn.diagnosis._search_state import SearchState
 from skidyn.diagnosis._spans import FOLLOWS_ANY, span_candidates
 from skidyn.diagnosis._spectrum import Line, find_lines, find_vibrations
 from skidyn.diagnosis._split import recordings_with, split_effects
+from skidyn.diagnosis._tester import Tester
 from skidyn.effects import get_effect
 
 Mask = NDArray[np.bool_]

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from skidyn.diagnosis._candidates import Candidate, rows_together, rows_within
-from skidyn.diagnosis._rule import Tester
+from skidyn.diagnosis._tester import Tester
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
+from skidyn.diagnosis._blocks import variance_inflation
 from skidyn.diagnosis._noise import as_measured, sensor_noise
 from skidyn.diagnosis._rule import (
     COLOURED_ALIKE,
@@ -26,7 +27,6 @@ from skidyn.diagnosis._rule import (
     REMAINDER_SLOW_TIMES_NOISE,
     REMAINDER_TIMES_NOISE,
     SELDOM_SHARE_OF_FOLDS,
-    variance_inflation,
 )
 from skidyn.evidence import Fit, Problem, smooth_motion
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from skidyn._last import LastResults
 from skidyn._signals import Array
+from skidyn.diagnosis._blocks import variance_inflation
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
 from skidyn.diagnosis._held_out import shares_of_folds
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, terms_on_rows, uses_the_fit
@@ -21,13 +22,8 @@ from skidyn.diagnosis._noise import sensor_noise
 from skidyn.diagnosis._profile import profile_error
 from skidyn.diagnosis._recordings import recording_candidates
 from skidyn.diagnosis._remainder import position_noise
-from skidyn.diagnosis._rule import (
-    CONFINED,
-    Settings,
-    Tester,
-    false_discovery_rate,
-    variance_inflation,
-)
+from skidyn.diagnosis._rule import CONFINED, Settings, false_discovery_rate
+from skidyn.diagnosis._tester import Tester
 from skidyn.effects import Term
 from skidyn.evidence import Problem
 

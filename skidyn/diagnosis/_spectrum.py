@@ -12,10 +12,11 @@ from scipy.ndimage import median_filter
 from scipy.optimize import minimize_scalar
 
 from skidyn._signals import Array
+from skidyn.diagnosis._chance import chance_of_score
 from skidyn.diagnosis._clock import clock_line
 from skidyn.diagnosis._parts import FEWEST, best_parts, n_parts
 from skidyn.diagnosis._profile import QUARTERS
-from skidyn.diagnosis._rule import SHORTEST_BLOCK, chance_of_score
+from skidyn.diagnosis._rule import SHORTEST_BLOCK
 from skidyn.effects import Term
 from skidyn.evidence import Problem
 

@@ -36,10 +36,10 @@ from skidyn.diagnosis._rule import (
     LITTLE,
     SURE_OF_LITTLE,
     UNLIKELY,
-    Tester,
     false_discovery_rate,
 )
 from skidyn.diagnosis._search_state import replace_torque
+from skidyn.diagnosis._tester import Tester
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 

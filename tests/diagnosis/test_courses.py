@@ -8,7 +8,7 @@ import pytest
 from skidyn.datasets import load_planar_arm
 from skidyn.diagnosis import diagnose
 from skidyn.diagnosis._courses import course_candidates
-from skidyn.diagnosis._rule import Tester
+from skidyn.diagnosis._tester import Tester
 from skidyn.effects import make_terms
 from skidyn.evidence import make_problem
 from skidyn.identification import RBDRegressor

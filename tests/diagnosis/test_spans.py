@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm
-from skidyn.diagnosis._rule import Tester
 from skidyn.diagnosis._spans import span_candidates
+from skidyn.diagnosis._tester import Tester
 from skidyn.effects import make_terms
 from skidyn.evidence import make_problem
 
