@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks of torque around zero: a dead band, and torque that was set to zero for each recording."""
+"""Checks of what is zero: a dead band, and torque or positions set to zero for each recording."""
 
 from __future__ import annotations
 
@@ -29,6 +29,10 @@ FAST = 0.02
 #: there; largest share of gravity that may remain there or on average; slope of the torque on
 #: gravity in recordings.
 RECORDINGS, ROWS, HEAVY, LEFT, FELT = 3, 5, 0.1, 0.1, 0.5
+#: Largest position at the start of recordings, in steps and as a share of the range; least share of
+#: the range at their ends, and of recordings with it; least spread of the torque at their starts,
+#: as a share of that of all rows, if the joints are at rest there.
+STEPS, NEAR, AWAY, OFTEN, SPREAD = 2.0, 1e-3, 0.1, 0.5, 0.4
 
 
 class DeadBand(Check):
@@ -152,3 +156,48 @@ def _felt(fits: Fits, joint: int) -> bool:
     if table[:, 1].std() < HEAVY * torque.std():
         return False
     return bool(np.linalg.lstsq(table[:, 1:], table[:, 0], rcond=None)[0][0] > FELT)
+
+
+class CountedPosition(Check):
+    """Position that was set to zero at the start of each recording."""
+
+    name = "counted_position"
+    suspects = "positions that are counted from the start of each recording"
+    misnames = True
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        s = measurement.signals
+        runs = [np.flatnonzero(s.trajectory == run) for run in np.unique(s.trajectory)]
+        moving = np.flatnonzero(measurement.excited)
+        if len(runs) < RECORDINGS or len(moving) < 2 or min(map(len, runs)) < ROWS:
+            return
+        q = s.q[:, moving]
+        first, last = (np.array([rows[at] for rows in runs]) for at in (0, -1))
+        span = np.ptp(q, axis=0)
+        step = np.array([position_step(column) for column in q.T])
+        near = np.maximum(NEAR * span, np.where(np.isfinite(step), STEPS * step, 0.0))
+        away = np.mean(np.abs(q[last]) > AWAY * span, axis=0) > OFTEN
+        if np.any(np.abs(q[first]) > near) or not away.any():
+            return
+        names = measurement.joints(moving)
+        speed = np.abs(s.dq[:, moving])
+        swift = np.median(speed[first] / speed.max(axis=0), axis=0)
+        torque = measurement.torque[:, moving]
+        starts = np.array([torque[rows[:ROWS]].mean(axis=0) for rows in runs])
+        spread = starts.std(axis=0) / np.maximum(torque.std(axis=0), 1e-300)
+        if np.sum(swift > FAST) > 1:
+            evidence = "although the joints move"
+        elif np.any(spread > SPREAD):
+            evidence = (
+                "but the torques differ between these rows by up to "
+                f"{spread.max():.0%} of their spread in all rows"
+            )
+        else:
+            return  # every recording begins in the zero pose
+        yield self.suspicion(
+            f"the positions of {names} are counted from the start of each recording",
+            f"all of them are zero in the first row of each, {evidence}; read the absolute "
+            "positions, or add the pose at the start of each recording",
+            "suspected",
+            moving,
+        )

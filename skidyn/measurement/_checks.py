@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from skidyn._exceptions import MisreadLogError
 from skidyn.measurement._acceleration import Acceleration
-from skidyn.measurement._around_zero import DeadBand, TaredTorque
+from skidyn.measurement._around_zero import CountedPosition, DeadBand, TaredTorque
 from skidyn.measurement._arrival import FalseGaps
 from skidyn.measurement._axes import Axes
 from skidyn.measurement._bodies import (
@@ -77,6 +77,7 @@ CHECKS: tuple[Check, ...] = (
     Velocity(),
     WrappedPosition(),
     OddMotion(),
+    CountedPosition(),
     JoinedRecordings(),
     HeldPosition(),
     StuckPosition(),

@@ -2,6 +2,7 @@
 """Torque around zero: dead bands, and torque that was set to zero."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from skidyn.datasets import load_scara, load_ur5, make_hidden_effect_log
@@ -75,3 +76,33 @@ def test_motor_torque_of_a_slider_was_not_tared():
 
 def test_no_effect_is_named_while_these_are_suspected():
     assert all(c.misnames for c in list_checks() if c.name in ("dead_band", "tared_torque"))
+
+
+def counted_from(first):
+    """Positions less those of a row of their recording, which begins there."""
+    q = [f"q{k + 1}" for k in range(6)]
+    frame = LOG.frame[LOG.frame.groupby("trajectory").cumcount() >= first].reset_index(drop=True)
+    return frame.assign(
+        **{n: frame.groupby("trajectory")[n].transform(lambda x: x - x.iloc[0]) for n in q}
+    )
+
+
+def test_positions_that_are_zero_where_recordings_begin_in_motion_are_counted_from_there():
+    told = told_of(counted_from(40))["counted_position"]
+    assert told.certainty == "suspected" and told.joints == tuple(range(1, 7))
+    assert "although the joints move" in told.evidence
+
+
+def test_recordings_that_begin_at_rest_in_the_zero_pose_are_as_they_should_be():
+    t = np.arange(300) / 100.0
+    sizes = np.random.default_rng(0).uniform(-1.0, 1.0, (4, 6))
+    q, dq, ddq = (
+        np.vstack([np.outer(of_time, size) for size in sizes])
+        for of_time in (1 - np.cos(2 * t), 2 * np.sin(2 * t), 4 * np.cos(2 * t))
+    )
+    tau = LOG.robot.inverse_dynamics(q, dq, ddq) + 0.5 * np.sign(dq)
+    names = [f"{symbol}{k + 1}" for symbol in ("q", "dq", "tau") for k in range(6)]
+    frame = pd.DataFrame(np.hstack([q, dq, tau]), columns=names)
+    frame["trajectory"], frame["time"] = np.repeat(range(4), len(t)), np.tile(t, 4)
+
+    assert "counted_position" not in told_of(frame)
