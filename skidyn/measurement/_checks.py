@@ -55,6 +55,7 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd import OddRecording
 from skidyn.measurement._odd_motion import OddMotion
 from skidyn.measurement._overflow import OverflowedTorque
+from skidyn.measurement._rate import GravityOnly
 from skidyn.measurement._slow_torque import SlowTorque
 from skidyn.measurement._smoothing import SmoothedTorque
 from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
@@ -96,6 +97,7 @@ CHECKS: tuple[Check, ...] = (
     OddRecording(),
     MotorsOfDifferential(),
     Columns(),
+    GravityOnly(),
     TorqueScale(),
     NoFriction(),
     UnexplainedTorque(),

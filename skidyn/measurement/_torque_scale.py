@@ -22,7 +22,7 @@ from skidyn.measurement._gains import (
 )
 from skidyn.measurement._joint_gravity import without_gravity
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._rate import other_rate, rate_gain
+from skidyn.measurement._rate import STATIC, asked_rate, rate_gain
 from skidyn.measurement._reading import Reading
 from skidyn.measurement._size import find_size
 from skidyn.measurement._suspicion import Suspicion, remedy_of
@@ -65,8 +65,9 @@ class TorqueScale(Check):
         gains = {k: float(g) for k, g in enumerate(here) if np.isfinite(g) and g > 0}
         values = np.array(list(gains.values()))
         sure = np.array(list(known.values()))
-        # accelerations of held positions are too small
-        rate = None if measurement.stale else other_rate(fits.loaded(), bool(odd))
+        rate = asked_rate(measurement, fits)
+        if rate is not None and rate < STATIC:
+            return  # the torque contains gravity only
         if rate is not None:
             value = float(f"{rate:.4g}")
             scales = {"time": float(f"{1 / value:.6g}"), "dq": value}

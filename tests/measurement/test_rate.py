@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Clock and velocities at another rate."""
 
+import numpy as np
 import pytest
 
 from skidyn.datasets import (
@@ -35,3 +36,15 @@ def test_a_rate_that_leaves_the_scale_of_every_torque(factor):
     frame = frame.assign(time=frame["time"] * factor, **speeds)
     (told,) = [s for s in check_log(frame, robot).checks if s.certainty != "noted"]
     assert told.remedy.option == f"--gain time={1 / factor:g},dq={factor:g}"
+
+
+def test_a_torque_of_gravity_alone_is_no_other_rate(told_of):
+    robot = load_ur5()
+    frame = make_hidden_effect_log(
+        robot, None, n_trajectories=4, duration=4.0, random_state=3
+    ).frame
+    pull = robot.gravity_torque(frame[[f"q{k}" for k in range(1, 7)]].to_numpy())
+    pull += np.random.default_rng(0).normal(0.0, 0.02, pull.shape)
+    told = told_of(frame.assign(**{f"tau{k + 1}": pull[:, k] for k in range(6)}), robot)
+    assert "contains gravity only" in told["gravity_only"].suspicion
+    assert "torque_scale" not in told
