@@ -35,11 +35,15 @@ class Drift:
         Its change with time.
     gains : tuple of float
         Log-likelihood gain over a constant lag, by joint.
+    is_of_log : bool
+        Whether it grows with the time of the log instead, as the lag of a clock that is set only
+        once, before the first of several recordings; ``lag`` is then that in their middle.
     """
 
     lag: float
     growth: float
     gains: tuple[float, ...]
+    is_of_log: bool
 
     @property
     def gain(self) -> float:
@@ -55,8 +59,7 @@ class Drift:
 def find_drift(fits: Fits, found: Delay) -> Drift | None:
     """Growing lag with which all joints together are explained best.
 
-    None if a constant lag explains the torque as well, or the lag of a clock that is set only once,
-    before the first of several recordings.
+    None if a constant lag explains the torque as well.
 
     Parameters
     ----------
@@ -70,17 +73,20 @@ def find_drift(fits: Fits, found: Delay) -> Drift | None:
     longest = float(since.max())
     growth = 2 * (found.late - found.early) / longest
     constant, lag = _at_peak(together, found.common, NEAR, lambda lag: lag)
-    middle, growth, own = _refined(together, since - longest / 2, lag, growth)
-    rivals = [constant]
-    clock = fits.signals.clock
+    time = since - longest / 2
+    middle, growth, own = _refined(together, time, lag, growth)
+    clock, is_of_log = fits.signals.clock, False
     if np.ptp(clock - since) > longest:  # the recordings follow each other on one clock
-        rivals.append(_refined(together, clock - clock.mean(), lag, growth)[2])
-    if own - max(rivals) < LEAST:
+        of_log = _refined(together, clock - clock.mean(), lag, growth)
+        if of_log[2] + LEAST > own:
+            time, is_of_log = clock - clock.mean(), True
+            middle, growth, own = of_log
+    if own - constant < LEAST:
         return None
-    there = together.fit_at(middle + growth * (since - longest / 2))
+    there = together.fit_at(middle + growth * time)
     gains = tuple(gains_of(together.fit_at(lag), there))
-    lag, growth = float(f"{middle - growth * longest / 2:.5f}"), float(f"{growth:.4g}")
-    return Drift(lag, growth, gains)
+    begin = middle if is_of_log else middle - growth * longest / 2
+    return Drift(float(f"{begin:.5f}"), float(f"{growth:.4g}"), gains, is_of_log)
 
 
 def since_beginning(fits: Fits) -> Array:

@@ -81,8 +81,10 @@ class TorqueDelay(Check):
         if measurement.stale or measurement.computed or measurement.smoothed:
             return  # held and interpolated values are always late or early
         drift = _drift(measurement, fits, found)
-        if drift is not None or _drifts(found):
-            yield self._drifting(found, drift)
+        if drift is not None:
+            # where positions jump, trajectories were cut that a file does not separate
+            known = not (drift.is_of_log or len(measurement.leaps))
+            yield self._drifting(found, drift if known and _is_sure(drift) else None)
             return
         odd = late_runs(found)
         most = max((one.gain for one in odd.values()), default=0.0)
@@ -344,19 +346,26 @@ def _drifts(found: Delay) -> bool:
 def _drift(measurement: Measurement, fits: Fits, found: Delay) -> Drift | None:
     """Lag that grows with time, on more than a single joint; None if there is none.
 
-    Where positions jump, trajectories were cut that a file does not separate.
+    That the lags in the halves of recordings differ is not enough: a filter delays faster motion
+    less, and halves have other motion.
     """
     apart = abs(found.late - found.early)
     least = _least_lag(measurement)
     if not measurement.coarse:
         least = min(least, max(DRIFTED, TRIED * found.drift_error))
-    if not apart > least or len(measurement.leaps):
+    differ = _drifts(found)
+    if not (differ or (apart > least and not len(measurement.leaps))):
         return None
     drift = find_drift(fits, found)
-    if drift is None or drift.gain < SURE:
+    if drift is None:
         return None
+    return drift if differ or (_is_sure(drift) and not drift.is_of_log) else None
+
+
+def _is_sure(drift: Drift) -> bool:
+    """Whether a growing lag gains much, and not on a single joint only."""
     most = max(drift.gains) if len(drift.gains) > 1 else 0.0
-    return drift if drift.gain - most > (1 - AGREEING) * drift.gain else None
+    return drift.gain >= SURE and drift.gain - most > (1 - AGREEING) * drift.gain
 
 
 def _all_drift(found: Delay, drift: float) -> bool:
