@@ -113,7 +113,7 @@ class TorqueDelay(Check):
             return
         moved = _late_motion(measurement, score, found)
         if moved is not None:
-            of_torque = moved.gain <= moved.own_gain + LEAST
+            of_torque = moved.gain <= moved.own_gain + LEAST and not moved.with_torque
             told = self._late_torque if of_torque else self._late_motion
             yield told(measurement, moved)
             return
@@ -218,13 +218,16 @@ class TorqueDelay(Check):
         )
 
     def _late_motion(self, measurement: Measurement, moved: LateMotion) -> Suspicion:
-        """Position and velocity of one joint that are late."""
+        """Position and velocity of one joint that are late, or its torque as well."""
         lag, k = float(f"{_whole(measurement, moved.lag):.5f}"), moved.joint
         late = {f"q{k + 1}": lag, f"dq{k + 1}": lag}
+        what, of_what = "position and velocity", "those of the other joints and to the torque"
+        if moved.with_torque:
+            late[f"tau{k + 1}"] = lag
+            what, of_what = "position, velocity and torque", "those of the other joints"
         return self.suspicion(
-            f"position and velocity of {measurement.joint(k)} are "
-            f"{'late' if lag > 0 else 'early'} by about {abs(1e3 * lag):.1f} ms relative to those "
-            "of the other joints and to the torque",
+            f"{what} of {measurement.joint(k)} are {'late' if lag > 0 else 'early'} by about "
+            f"{abs(1e3 * lag):.1f} ms relative to {of_what}",
             "without this delay, bodies, friction and rotor inertia explain all torques better by "
             f"{moved.gain:.0f} (log-likelihood), and with one of torque instead by "
             f"{max(moved.own_gain, moved.common_gain):.0f}",
@@ -308,12 +311,14 @@ def _late_motion(measurement: Measurement, score: Score, found: Delay) -> LateMo
     if abs(moved.lag) < 2 * (SMALLEST_COARSE if coarse else SMALLEST):
         return None
     late = late_joints(found)
-    if moved.joint in late or moved.joint in measurement.slow:
+    if moved.joint in measurement.slow or (moved.joint in late and not moved.with_torque):
         return None  # a joint that no other feels, or whose torque is late by itself
     if moved.gain > MOVED and moved.gain > LEAST + max(
         moved.own_gain, moved.common_gain, float(found.gains[late].sum())
     ):
         return moved
+    if moved.with_torque:
+        return None
     # of a joint that no other feels, either may be late
     alike = abs(moved.gain - moved.own_gain) <= LEAST
     alone = moved.own_gain > LEAST + max(moved.common_gain, float(found.gains[late].sum()))

@@ -10,12 +10,12 @@ from skidyn.logs import check_log
 ROBOT = load_ur5()
 
 
-def late(frame, joint, lag):
-    """Position and velocity of a joint that are late."""
+def late(frame, joint, lag, channels=("q", "dq")):
+    """Channels of a joint that are late."""
     frame = frame.copy()
     for rows in frame.groupby("trajectory").groups.values():
         time = frame.loc[rows, "time"].to_numpy()
-        for name in (f"q{joint}", f"dq{joint}"):
+        for name in (f"{channel}{joint}" for channel in channels):
             frame.loc[rows, name] = np.interp(time - lag, time, frame.loc[rows, name])
     return frame
 
@@ -57,3 +57,21 @@ def test_of_a_joint_that_no_other_feels_either_is_late():
     ]
     assert told.joints == (3,) and "position and velocity are late" in told.suspicion
     assert told.remedy.option.startswith("--late tau3=-0.03")
+
+
+@pytest.mark.parametrize("joint", [3, pytest.param(4, marks=pytest.mark.slow)])
+def test_all_channels_of_one_joint_are_late(joint):
+    frame = make_hidden_effect_log(
+        ROBOT, None, n_trajectories=5, duration=6.0, random_state=4
+    ).frame
+    changed = late(frame, joint, 0.04, ("q", "dq", "tau"))
+    (told,) = [s for s in check_log(changed, ROBOT).checks if s.check == "torque_delay"]
+    assert told.joints == (joint,)
+    assert told.suspicion.startswith("position, velocity and torque of joint")
+    option = told.remedy.option
+    assert [part.split("=")[0] for part in option.removeprefix("--late ").split(",")] == [
+        f"q{joint}",
+        f"dq{joint}",
+        f"tau{joint}",
+    ]
+    assert float(option.split("=")[1].split(",")[0]) == pytest.approx(0.04, abs=2e-3)
