@@ -26,6 +26,9 @@ from skidyn.measurement._torque import asked_changes, readable_fits
 LEAST, SURE = 15.0, 40.0
 #: Rates of clock and velocities that are tried.
 RATES = (0.1, 0.2, 0.33, 0.5, 2.0, 3.0, 5.0, 10.0)
+#: Share of the residual of identified bodies that another rate may leave on the joint that it helps
+#: most: noise of accelerations makes inertia look smaller, but its removal leaves most.
+HALF = 0.5
 #: Distance of the points of a parabola through the likelihood of the logarithm of a rate, how far
 #: identified bodies may move it, and how near it is to a whole multiple that is one.
 RATE_STEP, RATE_MOVES, RATE_WHOLE = 0.02, 0.2, 0.02
@@ -97,6 +100,13 @@ def other_rate(fits: Fits, odd: bool) -> float | None:
     usual = odd and len(gains) > 1 and all(USUAL[0] <= gain <= USUAL[1] for gain in gains)
     here, there = (fits.identified(Reading(stretch=x)) for x in (1.0, rate))
     confirmed = there.gained_over(here) > DECISIVE
+    shares = (
+        np.std(after) / max(float(np.std(before)), 1e-300)
+        for before, after in zip(here.residual, there.residual, strict=True)
+        if len(before)
+    )
+    if min(shares, default=1.0) > HALF:
+        return None
     return _sharpened(fits, rate) if usual or confirmed else None
 
 
