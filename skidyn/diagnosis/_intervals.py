@@ -70,7 +70,10 @@ def parameter_intervals(
     full, left = solve_left_out(grams, cross, (np.diag(known), np.zeros(len(known))))
     result = {}
     for i, (term, own) in enumerate(places):
-        value = term.parameters(whole[own], problem.signals)
+        apart = _half_width(held[:, own]) < np.abs(whole[own])
+        # what others are divided by is zero if it may be zero
+        has_value = np.array([not c.is_divisor for c in term.coefficients]) | apart
+        value = term.parameters(np.where(has_value, whole[own], 0.0), problem.signals)
         replicates = []
         # Without its recording an offset of that recording alone is not determined.
         seen = np.all(np.abs(left[:, own]) > 1e-12, axis=1)
@@ -82,10 +85,10 @@ def parameter_intervals(
                     shape[name] = shape[name] * np.exp(move) if log else shape[name] + move
             replicates.append(
                 term.with_shape(**shape).parameters(
-                    whole[own] + coefficients[own] - full[own], problem.signals
+                    np.where(has_value, whole[own] + coefficients[own] - full[own], 0.0),
+                    problem.signals,
                 )
             )
-        apart = _half_width(held[:, own]) < np.abs(whole[own])
         not_zero = {
             c.name for c, is_apart in zip(term.coefficients, apart, strict=True) if is_apart
         }

@@ -33,6 +33,9 @@ class Coefficient:
         Largest magnitude at which the formula still describes the effect.
     is_share : bool
         Whether it is a share of a shape parameter, so that its own size has no meaning.
+    is_divisor : bool
+        Whether other parameters are divided by it, as centers of mass by a mass. If it may be zero,
+        they have no meaning, and :meth:`Effect.parameters` is given a zero for it.
     is_zero : bool
         Whether it only defines the zero of the effect, as the constant of a spring: a finding must
         be significant without it.
@@ -51,6 +54,7 @@ class Coefficient:
     sign: int = 0
     limit: float = np.inf
     is_share: bool = False
+    is_divisor: bool = False
     is_zero: bool = False
     limit_kind: str = ""
 

@@ -78,7 +78,7 @@ class Payload(_ToolEffect):
     title = "Payload"
     formula = r"Y_n(q, \dot q, \ddot q)\,\pi_\mathrm{payload}"
     coefficients = (
-        Coefficient("mass", "kg"),
+        Coefficient("mass", "kg", is_divisor=True),
         Coefficient("mcx", "kg m"),
         Coefficient("mcy", "kg m"),
         Coefficient("mcz", "kg m"),
@@ -130,7 +130,7 @@ class Payload(_ToolEffect):
     ) -> dict[str, Any]:
         mass, moment = float(coefficients[0]), [float(v) for v in coefficients[1:4]]
         if max(map(abs, moment)) > FARTHEST * abs(mass):
-            # Too few joints to determine its mass, as on a single pendulum.
+            # Its mass is not determined, as by too few joints or on a single pendulum.
             return {f"first_moment_{a}": v for a, v in zip("xyz", moment, strict=True)}
         place = {f"com_{a}": v / mass if mass else 0.0 for a, v in zip("xyz", moment, strict=True)}
         return {"mass": mass, **place}

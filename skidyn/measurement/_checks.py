@@ -40,6 +40,7 @@ from skidyn.measurement._differential import MotorsOfDifferential
 from skidyn.measurement._divided import DividedRecordings
 from skidyn.measurement._elapsed import LostRows
 from skidyn.measurement._failed_reads import FailedReads
+from skidyn.measurement._gravity_of_recordings import GravityOfRecordings
 from skidyn.measurement._held import (
     HeldPosition,
     HeldTorque,
@@ -93,6 +94,7 @@ CHECKS: tuple[Check, ...] = (
     UNSIGNED,
     OverflowedTorque(),
     Axes(),
+    GravityOfRecordings(),
     DividedRecordings(),
     OddRecording(),
     MotorsOfDifferential(),

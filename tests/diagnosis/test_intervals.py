@@ -71,3 +71,26 @@ def test_a_size_that_an_uncertain_shape_leaves_open_is_not_zero(spring_log):
     assert same == value
     assert 0 < least < 1.0 < most
     assert most - value > value  # an interval that is symmetric about the value would contain zero
+
+
+def test_a_load_whose_mass_may_be_zero_has_first_moments_and_no_center_of_mass():
+    robot = load_ur5()
+    log = make_hidden_effect_log(robot, None, n_trajectories=6, duration=5.0, random_state=1)
+    q, dq, ddq = (
+        log.X[[f"{symbol}{k + 1}" for k in range(6)]].to_numpy() for symbol in ("q", "dq", "ddq")
+    )
+    load = np.zeros(10 * robot.n_bodies)
+    load[-9:-6] = 0.2, -0.3, 0.4
+    carried = log.X["trajectory"].to_numpy() < 3
+    torque = np.array(log.y)
+    torque[carried] += (robot.torque_regressor(q, dq, ddq) @ load)[carried]
+
+    (finding,) = diagnose(
+        RBDRegressor(robot), log.X, torque, effects=["payload"], checks=()
+    ).findings
+
+    moments = [finding.parameters[f"first_moment_{axis}"]["value"] for axis in "xyz"]
+    assert finding.kind == "payload" and set(finding.parameters) == {
+        f"first_moment_{axis}" for axis in "xyz"
+    }
+    np.testing.assert_allclose(moments, load[-9:-6], atol=0.1)
