@@ -489,6 +489,6 @@ def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataF
         moved = np.any(q[1:] != q[:-1], axis=1) & (number[1:] == number[:-1])
         torque = table[torques].to_numpy(dtype=float)
         again |= is_held(torque, moved)
-        again |= idle_rows(q, torque, table["time"].to_numpy(dtype=float), number)
+        again |= idle_rows(q, dq, torque, table["time"].to_numpy(dtype=float), number)
     notes.append(f"drop_repeated: {int(again.sum())} of {len(q)} rows left out")
     return table[~again].reset_index(drop=True)

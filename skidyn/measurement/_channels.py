@@ -122,7 +122,8 @@ class ConstantTorque(Check):
             yield self.suspicion(
                 "torque was not measured at the ends of recordings",
                 f"in {int(idle.sum())} rows, {idle.mean():.1%}, no torque changes: the drives "
-                "were not enabled, or their values arrived late",
+                "were not enabled, their values arrived late, or the ends were filled with the "
+                "last values",
                 "certain",
                 remedy=remedy_of("drop_repeated", True),
             )

@@ -295,7 +295,11 @@ class Measurement:
             return {}  # parts between leaps have no numbers of their own
         from skidyn.measurement._odd_motion import odd_motion
 
-        return odd_motion(self.whole, self.unwrapped, self.velocity_steps)
+        kept = ~self.idle
+        whole, q = self.whole, self.unwrapped
+        if not kept.all():
+            whole, q = whole.take(kept), q[kept]
+        return odd_motion(whole, q, self.velocity_steps)
 
     @cached_property
     def unwrapped(self) -> Array:
@@ -452,7 +456,7 @@ class Measurement:
     def idle(self) -> NDArray[np.bool_]:
         """Rows at the ends of recordings in which torque was not measured."""
         s = self.signals
-        return idle_rows(s.q, self.torque, s.clock, s.trajectory)
+        return idle_rows(s.q, s.dq, self.torque, s.clock, s.trajectory)
 
     @cached_property
     def missing(self) -> NDArray[np.bool_]:

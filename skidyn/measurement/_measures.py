@@ -202,16 +202,20 @@ def equal_values(values: np.ndarray, trajectory: np.ndarray) -> tuple[np.ndarray
 
 
 def idle_rows(
-    position: np.ndarray, torque: np.ndarray, time: np.ndarray, trajectory: np.ndarray
+    position: np.ndarray,
+    velocity: np.ndarray,
+    torque: np.ndarray,
+    time: np.ndarray,
+    trajectory: np.ndarray,
 ) -> np.ndarray:
     """Rows at the ends of recordings in which torque was not measured, as a mask.
 
     Before drives are enabled every torque is zero; a logger that receives torques late repeats the
-    first ones.
+    first ones, and one that loses its source the last ones of all channels.
 
     Parameters
     ----------
-    position, torque : ndarray of shape (n_samples, n_joints)
+    position, velocity, torque : ndarray of shape (n_samples, n_joints)
         Recorded signals.
     time : ndarray of shape (n_samples,), s
         Recorded clock.
@@ -221,7 +225,8 @@ def idle_rows(
     Returns
     -------
     ndarray of shape (n_samples,) of bool
-        Rows of zeros, or rows of the same torques in which a joint moves.
+        Rows of zeros, or rows of the same torques in which a joint moves, by its positions or by
+        its velocity.
     """
     idle = np.zeros(len(torque), dtype=bool)
     if torque.shape[1] < 2 or np.mean(torque == 0) > MOSTLY_ZERO:
@@ -240,7 +245,9 @@ def idle_rows(
             same = end[: int(np.argmax(changes))]  # none where it is constant throughout
             if len(same) < least:
                 continue
-            moved = np.any(np.ptp(position[same], axis=0) > far)
+            duration = abs(float(time[same[-1]] - time[same[0]]))
+            way = np.abs(np.mean(velocity[same], axis=0)) * duration
+            moved = np.any(np.maximum(np.ptp(position[same], axis=0), way) > far)
             if moved or not torque[same].any():
                 idle[same] = True
     return idle

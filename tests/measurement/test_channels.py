@@ -89,3 +89,16 @@ def test_a_dead_band_explains_zeros_at_the_ends(recorded, told_of):
     frame.loc[frame.groupby("trajectory").head(12).index, ["tau1", "tau2"]] = 0.0
     told = told_of(frame)
     assert "dead_band" in told and "constant_torque" not in told
+
+
+def test_ends_that_were_filled_with_the_last_values_of_all_channels_are_left_out(recorded, told_of):
+    frame = recorded.frame.copy()
+    channels = [name for name in frame.columns if name not in ("time", "trajectory")]
+    for rows in frame.groupby("trajectory").groups.values():
+        filled = rows[-60:]
+        frame.loc[filled, channels] = frame.loc[filled[0], channels].to_numpy()
+
+    told = told_of(frame)
+
+    assert told["constant_torque"].remedy.option == "--drop-repeated"
+    assert {check for check, s in told.items() if s.certainty != "noted"} == {"constant_torque"}
