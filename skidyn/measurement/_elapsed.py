@@ -41,6 +41,8 @@ WHOLE = 0.25
 #: Steps from row to row, as shares of a joint's spread and of what velocities make of them, that
 #: rows in no order at all have.
 LARGE, FASTER = 0.05, 5.0
+#: The latter of rows that are in order.
+ORDERLY = 1.5
 #: Velocities against the others, as a share of the largest, of a velocity with one sign; way back,
 #: as a share of the way forth, of a joint that moves both ways.
 ONE_SIGN, BOTH_WAYS = 0.01, 0.05
@@ -88,16 +90,25 @@ def elapsed_steps(measurement: Measurement) -> Elapsed | None:
     measurement : Measurement
         What was recorded.
     """
+    return _steps_of(measurement.signals, measurement.unwrapped, _used(measurement))
+
+
+def _used(measurement: Measurement) -> NDArray[np.intp]:
+    """Joints that move, whose steps are those of time."""
     s = measurement.signals
-    spread = s.q.std(axis=0)
-    used = np.flatnonzero((spread > 1e-3) & (s.dq.std(axis=0) > 1e-3))
+    used = np.flatnonzero((s.q.std(axis=0) > 1e-3) & (s.dq.std(axis=0) > 1e-3))
     used = np.setdiff1d(used, list(measurement.held))  # a held position catches up in one step
-    used = used[~_one_way(s, measurement.unwrapped)[used]]
+    return np.asarray(used[~_one_way(s, measurement.unwrapped)[used]])
+
+
+def _steps_of(s: Signals, position: Array, used: NDArray[np.intp]) -> Elapsed | None:
+    """Time between rows according to the velocities of some joints; None with too few of them."""
+    spread = s.q.std(axis=0)
     time = np.diff(s.clock)
     together = s.within & (time > 0)
     if len(used) < 2 or together.sum() < 200:
         return None
-    q, dq, time = measurement.unwrapped[:, used], s.dq[:, used], time[together]
+    q, dq, time = position[:, used], s.dq[:, used], time[together]
     moved = np.diff(q, axis=0)[together] / spread[used]
     expected = ((dq[1:] + dq[:-1]) / 2)[together] * time[:, None] / spread[used]
     product = np.sum(moved * expected, axis=1)
@@ -164,6 +175,20 @@ def _turned_trajectories(
     return turned if clear and len(turned) < len(shares) else []
 
 
+def _alternate(measurement: Measurement) -> bool:
+    """Whether every second row of all recordings, and the others, are in the order of time."""
+    s = measurement.signals
+    begins = np.maximum.accumulate(np.where(np.r_[True, ~s.within], np.arange(s.n_samples), 0))
+    second = (np.arange(s.n_samples) - begins) % 2 == 1
+    for rows in (second, ~second):
+        found = _steps_of(s.take(rows), measurement.unwrapped[rows], _used(measurement))
+        if found is None or found.disorder > ORDERLY:
+            return False
+        if np.mean(found.steps[found.moving] < -WHOLE) > BACKWARDS:
+            return False
+    return True
+
+
 class LostRows(Check):
     """Rows in wrong order of time, or with lost rows between them."""
 
@@ -186,6 +211,15 @@ class LostRows(Check):
         anyhow = found.size > LARGE and found.disorder > FASTER
         if anyhow or (share > BACKWARDS and forwards > BACKWARDS):
             measurement.lost = True
+            if _alternate(measurement):
+                yield self.suspicion(
+                    "every second row is of another source",
+                    "from row to row the joints move against their velocities or farther than "
+                    "these imply, but from every row to the next but one as they imply: two "
+                    "sources were written into one log; keep the rows of one of them",
+                    "certain",
+                )
+                return
             evidence = (
                 f"positions step by {100 * found.size:.0f} % of their spread from row to row, "
                 f"{found.disorder:.2g} times as far as their velocities imply"

@@ -15,6 +15,7 @@ from skidyn.measurement._fits import Fits
 from skidyn.measurement._joint_fit import lag_gain, refined_lag
 from skidyn.measurement._late_motion import LateMotion, find_late_motion
 from skidyn.measurement._late_run import LateRun, find_late_run
+from skidyn.measurement._late_runs import LateRuns, late_runs as lags_of_runs
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import is_short
@@ -85,6 +86,10 @@ class TorqueDelay(Check):
             # where positions jump, trajectories were cut that a file does not separate
             known = not (drift.is_of_log or len(measurement.leaps))
             yield self._drifting(found, drift if known and _is_sure(drift) else None)
+            return
+        apart = lags_of_runs(measurement)
+        if apart is not None:
+            yield from self._of_runs(apart)
             return
         odd = late_runs(found)
         most = max((one.gain for one in odd.values()), default=0.0)
@@ -158,6 +163,25 @@ class TorqueDelay(Check):
             )
             return
         yield from self._of_joints(measurement, fits, found)
+
+    def _of_runs(self, found: LateRuns) -> Iterator[Suspicion]:
+        """Recordings that have lags of their own, or a few of them."""
+        usual = float(np.median(list(found.lags.values())))
+        odd = {run: lag - usual for run, lag in found.lags.items() if abs(lag - usual) > APART}
+        gained = f"{found.gain:.0f} (log-likelihood)"
+        if len(odd) <= ODD * len(found.lags):
+            for run, lag in odd.items():
+                yield self._late_run(run, lag, gained)
+            return
+        told = ", ".join(f"{1e3 * lag:.0f} ms in {run}" for run, lag in found.lags.items())
+        yield self.suspicion(
+            "the torque has another lag relative to the motion in every trajectory",
+            f"it is late by {told}; with these lags, common bodies explain the torques of all "
+            f"trajectories better by {gained} than with one lag, and leave "
+            f"{100 * found.left:.0f} % of the residual of a joint; stamp torque and motion with "
+            "one clock, or shift the torque of every file",
+            "suspected",
+        )
 
     def _late_run(self, run: int, lag: float, gained: str) -> Suspicion:
         """A recording with late torque."""

@@ -120,3 +120,17 @@ def test_speeds_without_a_sign_are_not_rows_in_another_order():
     speeds = [c for c in FRAME if c.startswith("dq")]
     told = told_of(FRAME.assign(**{name: FRAME[name].abs() for name in speeds}))
     assert "lost_rows" not in told
+
+
+def test_a_second_source_in_every_other_row():
+    """Commands that are ahead of the motion and differ from it."""
+    frame = FRAME.copy()
+    motion = [f"{symbol}{k + 1}" for symbol in ("q", "dq") for k in range(4)]
+    for rows in frame.groupby("trajectory").groups.values():
+        ahead = np.minimum(np.arange(len(rows)) + 12, len(rows) - 1)
+        commands = frame.loc[rows, motion].to_numpy()[ahead]
+        frame.loc[rows[1::2], motion] = commands[1::2]
+
+    told = told_of(frame)["lost_rows"]
+
+    assert told.certainty == "certain" and told.suspicion.startswith("every second row")
