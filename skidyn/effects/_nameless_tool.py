@@ -14,7 +14,7 @@ from skidyn._signals import Array, Signals
 from skidyn.effects._base import Shape
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
 from skidyn.effects._smooth import splines, supported_range
-from skidyn.effects._tool import tool_jacobian, tool_position
+from skidyn.effects._tool import points_of_tool, tool_jacobian, tool_position
 
 #: Number of places at which a force is tried, and its widths as shares of the extent of the motion.
 _PLACES, _WIDTHS = 24, (0.08, 0.16, 0.3)
@@ -28,7 +28,13 @@ class _AtTool(NamelessEffect):
         return self.follows
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        return [] if signals.robot is None else self.tried(signals, tool_position(signals))
+        if signals.robot is None:
+            return []
+        return [
+            shape | point
+            for point in points_of_tool(signals)
+            for shape in self.tried(signals, tool_position(signals, **point))
+        ]
 
     def tried(self, signals: Signals, position: Array) -> list[dict[str, Any]]:
         """Shapes for a motion with these positions of the tool, (n_samples, 3)."""
@@ -49,7 +55,8 @@ class FunctionOfToolPosition(_AtTool):
         return [_extent(position)] if signals.n_joints > 3 else []
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        return _polynomials(tool_position(signals), shape["low"], shape["high"], 4)
+        position = tool_position(signals, shape.get("point", -1))
+        return _polynomials(position, shape["low"], shape["high"], 4)
 
 
 class _ForceAtTool(_AtTool):
@@ -74,9 +81,10 @@ class DragOnTool(_ForceAtTool):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        height = tool_position(signals)[:, 2]
+        point = shape.get("point", -1)
+        height = tool_position(signals, point)[:, 2]
         field = splines(height, shape["low"], shape["high"], len(self.coefficients))
-        jacobian = tool_jacobian(signals)
+        jacobian = tool_jacobian(signals, point)
         velocity = np.einsum("ian,in->ia", jacobian, signals.dq)
         return {j: np.sum(jacobian[:, :, j] * velocity, axis=1)[:, None] * field for j in joints}
 
@@ -95,8 +103,9 @@ class ForceOverToolPosition(_ForceAtTool):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        field = _polynomials(tool_position(signals), shape["low"], shape["high"], 2)
-        jacobian = tool_jacobian(signals)
+        point = shape.get("point", -1)
+        field = _polynomials(tool_position(signals, point), shape["low"], shape["high"], 2)
+        jacobian = tool_jacobian(signals, point)
         return {
             j: np.hstack([-jacobian[:, axis, [j]] * field for axis in range(3)]) for j in joints
         }
@@ -116,7 +125,7 @@ class ForceNearPoint(_ForceAtTool):
 
     def tried(self, signals: Signals, position: Array) -> list[dict[str, Any]]:
         places = _spread_out(position, _PLACES)
-        reach = self.travel(signals, (), {})
+        reach = float(np.max(np.ptp(position, axis=0)))
         return [
             dict(zip("xyz", map(float, place), strict=True)) | {"width": share * reach}
             for place in places
@@ -124,16 +133,17 @@ class ForceNearPoint(_ForceAtTool):
         ]
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        return float(np.max(np.ptp(tool_position(signals), axis=0)))
+        position = tool_position(signals, shape.get("point", -1))
+        return float(np.max(np.ptp(position, axis=0)))
 
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        position = tool_position(signals)
-        point = np.array([shape[axis] for axis in "xyz"])
-        away = (position - point) / max(shape["width"], 1e-9)
+        touched = shape.get("point", -1)
+        place = np.array([shape[axis] for axis in "xyz"])
+        away = (tool_position(signals, touched) - place) / max(shape["width"], 1e-9)
         near = np.exp(-0.5 * np.einsum("ia,ia->i", away, away))[:, None]
-        jacobian = tool_jacobian(signals)
+        jacobian = tool_jacobian(signals, touched)
         radial = np.einsum("iaj,ia->ij", jacobian, away)
         columns = {}
         for j in joints:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,26 +13,65 @@ from skidyn._signals import Array, Signals
 from skidyn.effects._base import Coefficient, Effect, Shape
 from skidyn.effects._springs import FEWEST_TOUCHING, MOST_TOUCHING
 
+if TYPE_CHECKING:
+    from skidyn.robots import Robot
 
-def _tool_pose(signals: Signals) -> tuple[Array, Array]:
+
+#: Distance in m of a link that is fixed to the last body from which it is another point of it.
+_ANOTHER_POINT = 0.01
+
+
+def tip(robot: Robot) -> str | None:
+    """Name of the link farthest from the origin of the last body to which it is fixed.
+
+    That of a tool or a flange, by which a robot touches its environment; None if there is none.
+    """
+    fixed = {
+        name: float(np.linalg.norm(link.translation))
+        for name, link in robot.links.items()
+        if link.body == robot.n_bodies - 1
+    }
+    farthest = max(fixed, key=lambda name: fixed[name], default=None)
+    return farthest if farthest and fixed[farthest] > _ANOTHER_POINT else None
+
+
+def points_of_tool(signals: Signals) -> list[dict[str, str]]:
+    """Shapes of the points at which something may touch the tool: its origin, and its tip."""
+    assert signals.robot is not None
+    name = tip(signals.robot)
+    return [{}] if name is None else [{}, {"point": name}]
+
+
+def _tool_pose(signals: Signals, point: str | int = -1) -> tuple[Array, Array]:
     """Position and orientation of the tool, (n_samples, 3) and (n_samples, 3, 3), computed once."""
     robot = signals.robot
     assert robot is not None
-    pose: tuple[Array, Array] = signals.once("tool", lambda: robot.forward_kinematics(signals.q))
+    pose: tuple[Array, Array] = signals.once(
+        f"tool {point}", lambda: robot.forward_kinematics(signals.q, point)
+    )
     return pose
 
 
-def tool_position(signals: Signals) -> Array:
-    """Position of the tool, (n_samples, 3), computed once for all shapes."""
-    return _tool_pose(signals)[0]
+def tool_position(signals: Signals, point: str | int = -1) -> Array:
+    """Position of the tool, (n_samples, 3), computed once for all shapes.
+
+    Parameters
+    ----------
+    signals : Signals
+        Motion and robot.
+    point : str or int, default=-1
+        Link that is taken for the tool; the last body by default.
+    """
+    return _tool_pose(signals, point)[0]
 
 
-def tool_jacobian(signals: Signals) -> Array:
+def tool_jacobian(signals: Signals, point: str | int = -1) -> Array:
     """Its velocity per unit joint velocity, (n_samples, 3, n_joints), computed once."""
     robot = signals.robot
     assert robot is not None
     jacobian: Array = signals.once(
-        "tool jacobian", lambda: robot.jacobian(signals.q)[:, :3].copy(order="K")
+        f"tool jacobian {point}",
+        lambda: robot.jacobian(signals.q, point)[:, :3].copy(order="K"),
     )
     return jacobian
 
@@ -150,7 +189,8 @@ class ExternalWrench(_ToolEffect):
 
     If it does not act at the origin of the tool, its moment about the origin is constant, too. Its
     direction is that in the frame of the base, or, with ``on_tool``, that in the frame of the tool,
-    as of a jet or a propeller.
+    as of a jet or a propeller. The tool is the origin of the last body, or with ``point`` the link
+    of this name that is fixed to it.
     """
 
     kind = "external_wrench"
@@ -162,6 +202,7 @@ class ExternalWrench(_ToolEffect):
         *(Coefficient(f"m{axis}", "N m") for axis in "xyz"),
     )
     forms = ({"on_tool": 1.0},)
+    places = ("point",)
     # One trajectory determines a force, and a moment only if it turns the tool about all axes.
     leading = 3
     simplicity = 28
@@ -172,7 +213,7 @@ class ExternalWrench(_ToolEffect):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        parts = [tool_jacobian(signals), _turning_jacobian(signals)]
+        parts = [tool_jacobian(signals, shape.get("point", -1)), _turning_jacobian(signals)]
         if "on_tool" in shape:
             orientation = _tool_pose(signals)[1]
             parts = [np.einsum("iab,iaj->ibj", orientation, part) for part in parts]
@@ -183,16 +224,20 @@ class ExternalWrench(_ToolEffect):
         turns = np.ptp(orientation, axis=0).max(initial=0.0) > _LEAST_TURN
         return super().grid(signals, joints) if turns else [{}]
 
+    def elsewhere(self, signals: Signals) -> list[dict[str, Any]]:
+        return [dict(point) for point in points_of_tool(signals) if point]
+
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
         frame = "tool_" if "on_tool" in shape else ""
         names = [f"{frame}{what}_{axis}" for what in ("force", "moment") for axis in "xyz"]
-        return dict(zip(names, map(float, coefficients), strict=True))
+        values: dict[str, Any] = dict(zip(names, map(float, coefficients), strict=True))
+        return values | {"point": shape["point"]} if "point" in shape else values
 
     def meaning(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         if "tool_force_x" not in parameters:
-            return ""
+            return _at_point(parameters)
         return "The force turns with the tool: its components are along the axes of the last link."
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
@@ -219,7 +264,8 @@ class EnvironmentContact(Effect):
     stiffens: then the force grows with another ``power`` of the depth (1 if the shape has none), in
     units of 1 m, so that the unit of the stiffness is the same. A contact that loses energy has a
     larger force during approach, by the factor ``1 + damping`` times the speed of the approach
-    (Hunt, Crossley 1975, J. Applied Mechanics 42(2)), and never pulls.
+    (Hunt, Crossley 1975, J. Applied Mechanics 42(2)), and never pulls. The tool is the origin of
+    the last body, or with ``point`` the link of this name that is fixed to it.
     """
 
     kind = "environment_contact"
@@ -248,7 +294,14 @@ class EnvironmentContact(Effect):
     reference = "Khatib (1987), IEEE JRA 3(1), 43-53."
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        position = tool_position(signals)
+        return [
+            shape | point
+            for point in points_of_tool(signals)
+            for shape in self._grid_of(tool_position(signals, **point))
+        ]
+
+    def _grid_of(self, position: Array) -> list[dict[str, Any]]:
+        """Planes for positions of the tool."""
         along_axes = [
             {
                 "z0": float(side * np.quantile(side * position[:, axis], share)),
@@ -271,22 +324,32 @@ class EnvironmentContact(Effect):
         plain = along_axes + oblique
         return plain + [shape | form for form in (stiffening, damped) for shape in plain[1::3]]
 
+    def meaning(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
+        return _at_point(parameters)
+
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         return bool(FEWEST_TOUCHING < np.mean(_depth(signals, shape) > 0) < MOST_TOUCHING)
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        return float(np.ptp(tool_position(signals) @ _normal(shape)))
+        return float(np.ptp(tool_position(signals, shape.get("point", -1)) @ _normal(shape)))
 
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        reach = np.einsum("ian,a->in", tool_jacobian(signals), _normal(shape))
+        jacobian = tool_jacobian(signals, shape.get("point", -1))
+        reach = np.einsum("ian,a->in", jacobian, _normal(shape))
         pressure = _depth(signals, shape) ** shape.get("power", 1.0)
         if "damping" in shape:
             approach = -np.sum(reach * signals.dq, axis=1)
             pressure = pressure * np.maximum(0.0, 1.0 + shape["damping"] * approach)
         pressed = -pressure[:, None] * reach
         return {j: pressed[:, [j]] for j in joints}
+
+
+def _at_point(parameters: Mapping[str, Mapping[str, Any]]) -> str:
+    """At which point of the last body a force acts, if not at its origin; as a sentence."""
+    name = parameters.get("point", {}).get("value")
+    return f"It acts at the origin of link {name!r}." if name else ""
 
 
 def _normal(shape: Mapping[str, Any]) -> Array:
@@ -299,7 +362,7 @@ def _normal(shape: Mapping[str, Any]) -> Array:
 
 def _depth(signals: Signals, shape: Mapping[str, Any]) -> Array:
     """Depth of the tool in a plane in m, 0 outside, shape (n_samples,)."""
-    position, normal = tool_position(signals), _normal(shape)
+    position, normal = tool_position(signals, shape.get("point", -1)), _normal(shape)
     if "azimuth" in shape:
         position = position - np.array([shape[axis] for axis in "xyz"])
         return np.asarray(np.maximum(0.0, shape["z0"] - position @ normal))

@@ -2,8 +2,12 @@
 """Payload, force and contact at the tool against the dynamics of the robot."""
 
 import numpy as np
+import pytest
 
+from skidyn.datasets import make_hidden_effect_log
+from skidyn.diagnosis import diagnose
 from skidyn.effects import Signals, Term, get_effect
+from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
 
 GANTRY = """<robot name="gantry"><link name="base"/>
@@ -103,3 +107,55 @@ def test_what_is_pressed_between_round_bodies_stiffens(signals):
     stiffening = effect.torque_columns(signals, (0, 1), power=1.5, **plane)[0][:, 0]
     depth = np.maximum(0.0, 0.4 - signals.robot.forward_kinematics(signals.q)[0][:, 2])
     np.testing.assert_allclose(stiffening, plain * np.sqrt(depth), atol=1e-12)
+
+
+#: A link that is fixed to the last body of an arm of three joints, and its origin there.
+TOOL, AT = "nozzle", (0.05, 0.0, 0.2)
+BODY = """<link name="{n}"><inertial><origin xyz="0 0 0.2"/><mass value="3"/>
+<inertia ixx="0.05" iyy="0.05" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="joint{n}" type="revolute"><parent link="{before}"/><child link="{n}"/>
+<origin xyz="0 0 {length}"/><axis xyz="{axis}"/>
+<limit lower="-2" upper="2" effort="200" velocity="3"/></joint>"""
+
+
+def with_tool():
+    bodies = (
+        BODY.format(n=n, before=n - 1, length=length, axis=axis)
+        for n, length, axis in ((1, 0.2, "0 0 1"), (2, 0.1, "0 1 0"), (3, 0.4, "0 1 0"))
+    )
+    tool = (
+        f'<link name="{TOOL}"/><joint name="mount" type="fixed"><parent link="3"/>'
+        f'<child link="{TOOL}"/><origin xyz="{AT[0]} {AT[1]} {AT[2]}"/></joint>'
+    )
+    return Robot.from_urdf(f'<robot name="arm"><link name="0"/>{"".join(bodies)}{tool}</robot>')
+
+
+def test_a_contact_acts_at_the_origin_of_the_last_body_or_at_the_tool_fixed_to_it():
+    robot, q = with_tool(), np.random.default_rng(0).uniform(-1.0, 1.0, (200, 3))
+    signals = Signals(q, q, q, trajectory=np.zeros(200, dtype=int), robot=robot)
+    contact = get_effect("environment_contact")
+    points = {shape.get("point") for shape in contact.grid(signals, (0, 1, 2))}
+    assert points == {None, TOOL}
+    plane = {"z0": 0.7, "side": 1.0, "axis": 2}
+    for point, link in (({}, -1), ({"point": TOOL}, TOOL)):
+        columns = contact.torque_columns(signals, (0, 1, 2), **plane, **point)
+        depth = np.maximum(0.0, 0.7 - robot.forward_kinematics(q, link)[0][:, 2])
+        push = depth[:, None] * robot.jacobian(q, link)[:, 2]
+        np.testing.assert_allclose(np.hstack([columns[j] for j in range(3)]), -push, atol=1e-12)
+
+
+def test_a_contact_of_the_tool_is_found_with_the_link_that_touches():
+    robot = with_tool()
+    log = make_hidden_effect_log(robot, None, n_trajectories=6, duration=5.0, random_state=1)
+    q = log.X[["q1", "q2", "q3"]].to_numpy()
+    height = robot.forward_kinematics(q, TOOL)[0][:, 2]
+    floor = float(np.quantile(height, 0.15))
+    force = 2000.0 * np.maximum(0.0, floor - height)
+    torque = log.y - force[:, None] * robot.jacobian(q, TOOL)[:, 2]
+
+    (finding,) = diagnose(RBDRegressor(robot), log.X, torque, checks=()).findings
+
+    assert finding.kind == "environment_contact"
+    assert finding.parameters["point"]["value"] == TOOL
+    assert finding.parameters["z0"]["value"] == pytest.approx(floor, abs=0.02)
+    assert f"link '{TOOL}'" in finding.sentence
