@@ -135,6 +135,25 @@ class FrictionOverPosition(NamelessEffect):
         return np.column_stack([*(w * dq for w in waves), *(w * sign for w in waves[:2])])
 
 
+class FrictionOverAcceleration(NamelessEffect):
+    """Friction that grows with the size of the joint's own acceleration, as by loads of inertia."""
+
+    kind = "friction_over_acceleration"
+    drawn_against = "dq"
+    title = "Friction that follows the acceleration"
+    formula = r"f(|\ddot q_j|)\,\mathrm{sign}\,\dot q_j"
+    coefficients = unnamed_coefficients(2)
+    depends_on = ("dq_own", "ddq_own")
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        size = float(np.sqrt(np.mean(signals.ddq[:, joints[0]] ** 2)))
+        return [{"size": size}] if size > 0 else []
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        x = np.abs(signals.ddq[:, joint]) / shape["size"]
+        return np.column_stack([x, x**2]) * signals.sign[:, [joint]]
+
+
 class FunctionOfPositionAndVelocity(_Spline):
     """A torque that depends on the joint's own position and velocity, in low orders.
 
@@ -234,6 +253,7 @@ NAMELESS: tuple[type[NamelessEffect], ...] = (
     FunctionOfPosition,
     FunctionOfVelocity,
     FrictionOverPosition,
+    FrictionOverAcceleration,
     FunctionOfPositionAndVelocity,
     FunctionOfTwoPositions,
     FrictionOverOtherPosition,

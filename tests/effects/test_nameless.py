@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from skidyn.effects import Term
+from skidyn.effects import Term, get_effect
 
 
 def test_a_push_during_motion_is_a_function_of_position_and_velocity(signals, left_by):
@@ -18,3 +18,12 @@ def test_friction_over_position_vanishes_at_rest(signals):
     rest = signals.with_(dq=np.zeros_like(signals.dq))
     columns = Term("friction_over_position", (1,)).torque_columns(rest)[0]
     assert (columns == 0).all()
+
+
+def test_friction_over_acceleration_opposes_the_motion_and_grows_with_its_size(signals):
+    (shape,) = get_effect("friction_over_acceleration").grid(signals, (0,))
+    columns = Term("friction_over_acceleration", (1,), shape).torque_columns(signals)[0]
+    size = np.abs(signals.ddq[:, 0]) / shape["size"]
+    expected = np.column_stack([size, size**2]) * signals.sign[:, [0]]
+    np.testing.assert_allclose(columns, expected)
+    assert get_effect("friction_over_acceleration").variables(0, shape) == ("dq1", "ddq1")
