@@ -3,10 +3,11 @@
 
 from typing import TYPE_CHECKING, Any
 
-from skidyn.effects._base import Coefficient, Effect, Shape
+from skidyn.effects._base import Effect
 from skidyn.effects._catalogue import make_terms
 from skidyn.effects._formula import formula
 from skidyn.effects._hysteresis import dahl_state, stop_state
+from skidyn.effects._parameters import Coefficient, Shape
 from skidyn.effects._registry import (
     get_effect,
     list_effects,

@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from skidyn._signals import SIGN_BLUR, Array, Signals
-from skidyn.effects._base import Coefficient, Effect, Shape
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient, Shape
 from skidyn.effects._springs import stiffens
 
 _RATIO = Shape(

@@ -13,7 +13,8 @@ import numpy as np
 
 from skidyn._exceptions import EffectError
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient
 from skidyn.effects._term import Term
 
 #: Longest formula and largest exponent; formulas of friction or springs are far below both.

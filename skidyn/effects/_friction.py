@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect, Shape
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient, Shape
 
 _ARMSTRONG = "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), 1083-1138."
 

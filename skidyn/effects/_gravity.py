@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient
 
 #: Share of the gravity torque of other joints below which the first joint is vertical: descriptions
 #: round their angles.

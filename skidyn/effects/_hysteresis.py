@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect, Shape
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient, Shape
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ from __future__ import annotations
 from typing import Any
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient
 
 
 class RotorInertia(Effect):

@@ -13,7 +13,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect, Shape
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient, Shape
 
 #: Steps of the solution for the motor's torque. One is exact where friction is linear in it.
 _STEPS = 3

@@ -12,7 +12,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient
 from skidyn.effects._smooth import ordered_functions, splines, supported_range
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Shape
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
+from skidyn.effects._parameters import Shape
 from skidyn.effects._second_order import second_order_filter
 
 

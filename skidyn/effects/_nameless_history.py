@@ -10,10 +10,10 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Shape
 from skidyn.effects._hysteresis import cut_strokes, dahl_state, stop_along, strokes_of
 from skidyn.effects._moments import moments
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
+from skidyn.effects._parameters import Shape
 from skidyn.effects._smooth import splines, supported_range
 
 #: Distances since the last reversal, rad or tenths of m, over which a torque may fade.

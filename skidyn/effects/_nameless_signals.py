@@ -10,8 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Effect, Shape
+from skidyn.effects._base import Effect
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
+from skidyn.effects._parameters import Shape
 from skidyn.effects._smooth import (
     HIGHEST_ORDER,
     ordered_functions,

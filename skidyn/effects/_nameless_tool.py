@@ -11,8 +11,8 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Shape
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
+from skidyn.effects._parameters import Shape
 from skidyn.effects._smooth import splines, supported_range
 from skidyn.effects._tool import points_of_tool, tool_jacobian, tool_position
 

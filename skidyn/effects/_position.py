@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect, Shape
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient, Shape
 
 
 class PositionDependentFriction(Effect):

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from skidyn.effects._base import Coefficient, Effect
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient
 
 _BAM = (
     "Duclusaud, Passault, Padois, Ly (2024), Extended friction models for the physics simulation "

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect, Shape
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient, Shape
 
 #: Smallest and largest share of samples in contact; with more samples it is a spring.
 FEWEST_TOUCHING, MOST_TOUCHING = 0.001, 0.6

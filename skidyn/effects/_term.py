@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from skidyn._exceptions import EffectError
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient
 from skidyn.effects._registry import get_effect
 
 #: Number of joints of the motion on which terms are tried; larger than that of any robot here.

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect, Shape
+from skidyn.effects._base import Effect
 from skidyn.effects._moments import moments, starts
+from skidyn.effects._parameters import Coefficient, Shape
 
 #: Temperature at which the derivatives are stated, in degrees Celsius.
 REFERENCE_TEMPERATURE = 30.0

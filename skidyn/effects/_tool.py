@@ -10,7 +10,8 @@ import numpy as np
 
 from skidyn._exceptions import EffectError
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect, Shape
+from skidyn.effects._base import Effect
+from skidyn.effects._parameters import Coefficient, Shape
 from skidyn.effects._springs import FEWEST_TOUCHING, MOST_TOUCHING
 
 if TYPE_CHECKING:

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array, Signals
-from skidyn.effects._base import Coefficient, Effect, Shape
+from skidyn.effects._base import Effect
 from skidyn.effects._derivatives import smooth_derivatives
 from skidyn.effects._nameless import NamelessEffect
+from skidyn.effects._parameters import Coefficient, Shape
 
 
 def _swing(
