@@ -35,6 +35,8 @@ SOUND = "✓"
 SAME = 0.02
 #: Confidence below which a finding is doubtful.
 SURE = 0.9
+#: Parameters that the sentence has in other words.
+UNTOLD = ("trajectories", "trajectory")
 #: Number of parameters in one line, by the number of joints with separate ones.
 TOLD = {1: 3, 2: 2, 3: 1}
 #: Number of joints whose sizes are shown in one line.
@@ -343,7 +345,10 @@ def sure(finding: Finding) -> str:
 
 def sizes(finding: Finding) -> str:
     """The parameters of a finding with their intervals, ``"k = 3.50 ± 0.40 N m/rad"``."""
-    return ", ".join(_parameters(finding)[0][: _told(finding)])
+    parts = zip(_parameters(finding)[0], _shown(finding), strict=True)
+    # a form that was chosen, such as the side of a plane, is no size
+    told = [part for part, row in parts if row["unit"] or row["low"] is not None]
+    return ", ".join(told[: _told(finding)])
 
 
 def _told(finding: Finding) -> int:
@@ -352,11 +357,16 @@ def _told(finding: Finding) -> int:
     return TOLD[min(len(finding.joints), 3) if apart else 1]
 
 
+def _shown(finding: Finding) -> list[dict[str, Any]]:
+    """Values of the parameters that have a text."""
+    return [row for name, row in finding.parameters.items() if name not in UNTOLD]
+
+
 def _parameters(finding: Finding) -> tuple[list[str], list[float]]:
     """Text of parameters, and distance of each from zero in half widths of its interval."""
     parts, weights = [], []
     for name, row in finding.parameters.items():
-        if name in ("trajectories", "trajectory"):
+        if name in UNTOLD:
             continue
         values = row["value"] if isinstance(row["value"], list) else [row["value"]]
         lows, highs = (

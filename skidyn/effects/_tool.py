@@ -326,7 +326,12 @@ class EnvironmentContact(Effect):
         return plain + [shape | form for form in (stiffening, damped) for shape in plain[1::3]]
 
     def meaning(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
-        return _at_point(parameters)
+        told = _at_point(parameters)
+        if "axis" in parameters:
+            sign = "−" if parameters["side"]["value"] < 0 else "+"
+            axis = "xyz"[int(parameters["axis"]["value"])]
+            told = f"The surface faces the {sign}{axis} direction of the base. {told}".rstrip()
+        return told
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         return bool(FEWEST_TOUCHING < np.mean(_depth(signals, shape) > 0) < MOST_TOUCHING)
