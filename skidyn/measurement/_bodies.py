@@ -16,6 +16,7 @@ from skidyn.measurement._crosstalk import find_shares
 from skidyn.measurement._fits import Fits, lines_between
 from skidyn.measurement._gains import CLEARLY
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._measures import COARSE
 from skidyn.measurement._outcome import Outcome
 from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion
@@ -168,18 +169,24 @@ class UnexplainedTorque(Check):
         if joints:  # that of another joint may be larger than its own
             shared = {share.joint for share in find_shares(measurement, seen.fits)}
             joints = [k for k in joints if k not in shared]
-        bad = np.isin(seen.joints, joints)
-        if joints:
-            names = measurement.joints(joints)
+        # accelerations from coarse positions may be unrelated to the motion themselves
+        rough = [k for k in joints if COARSE < measurement.position_steps[k] < np.inf]
+        for own in (rough, [k for k in joints if k not in rough]):
+            bad = np.isin(seen.joints, own)
+            if not own:
+                continue
             shares = ", ".join(f"{100 * share:.0f} %" for share in least[bad])
             others = ", ".join(f"{100 * share:.0f} %" for share in held[bad])
+            what = f"the torque of {measurement.joints(own)} is nearly unrelated to the motion"
+            if own is rough:
+                what += ", or its positions are too coarse for accelerations"
             yield self.suspicion(
-                f"the torque of {names} is nearly unrelated to the motion",
+                what,
                 f"stated or identified bodies with any friction leave {shares} of its spread, and "
                 f"bodies identified on the other parts of the log {others} of it; it may be "
                 "another signal, of another joint or another time",
-                "suspected",
-                joints,
+                "noted" if own is rough else "suspected",
+                own,
             )
 
 
