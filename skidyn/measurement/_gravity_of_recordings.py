@@ -48,12 +48,16 @@ class GravityOfRecordings(Check):
             return
         fits = seen.fits.loaded()
         shares = gravity_shares(fits)
-        lacking = [run for run, share in shares.items() if share < LACKS]
-        having = [run for run, share in shares.items() if share > HAS]
-        if len(shares) < RECORDINGS or not lacking or len(lacking) + len(having) < len(shares):
+        judged = [run for run, share in shares.items() if not LACKS < share < HAS]
+        if len(shares) < RECORDINGS or len(judged) < len(shares):
             return
-        if not having:
-            return  # gravity is missing in all of them
+        # one with too few rows is as that before it
+        runs = np.unique(fits.recording)
+        before = np.maximum(np.searchsorted(judged, runs, side="right") - 1, 0)
+        lacks = np.array([shares[judged[at]] < HAS for at in before])
+        if lacks.all() or not lacks.any():
+            return
+        lacking = runs[lacks].tolist()
         torque = fits.torque.copy()
         rows = np.isin(fits.signals.trajectory, lacking)
         torque[rows] += fits.robot.gravity_torque(fits.signals.q[rows])
