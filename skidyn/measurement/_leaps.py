@@ -9,6 +9,8 @@ import numpy as np
 #: the deviation from even motion, and as a share of its range; most joined places,
 #: as a share of the rows.
 FARTHER, BEYOND, RANGE, PLACES = 4.0, 8.0, 1e-3, 2e-3
+#: Range in rad or m within which a joint rests.
+RESTS = 2e-3
 #: Most steps that a position may be held before it catches up.
 CATCH_UP = 5
 #: Most rows after which a position jumps back to its course, and how many times as far as its steps
@@ -103,6 +105,9 @@ def _jumps(moved: np.ndarray, q: np.ndarray) -> np.ndarray:
     far = np.abs(moved) > FARTHER * most
     if not far.any():
         return np.asarray(far)  # as in most logs
+    # a joint that rests moves by a step of its encoder now and then
+    if np.ptp(q) < RESTS:
+        far &= np.abs(moved) > FARTHER * np.abs(moved[moved != 0]).min(initial=np.inf)
     # a position that was held catches up in one step
     far &= np.abs(moved) > FARTHER * (1 + _held_before(moved)) * most
     around.sort(axis=0)
