@@ -71,10 +71,15 @@ def find_late_runs(score: Score) -> LateRuns | None:
     runs, counts = np.unique(number, return_counts=True)
     if len(runs) < RECORDINGS or counts.min() < FEWEST or not score.joints:
         return None
+    place, middle = np.searchsorted(runs, number), len(LAGS) // 2
+    some = LAGS[middle % 2 :: 2]
+    shifted = np.array([fits.average(fits.torque_at(lag)) for lag in some])
+    at = np.full(len(runs), middle // 2)
+    if np.ptp(_costs(score, shifted, score.plain, place, at).argmin(axis=1)) == 0:
+        return None  # as in most logs
     shifted = np.array([fits.average(fits.torque_at(lag)) for lag in LAGS])
     plain = _of_common(score, shifted)
     chosen = np.full(len(runs), plain[0])
-    place = np.searchsorted(runs, number)
     seen: set[tuple[int, ...]] = set()
     while tuple(chosen.tolist()) not in seen and len(seen) < ROUNDS:
         seen.add(tuple(chosen.tolist()))
@@ -131,7 +136,7 @@ def _costs(
 ) -> Array:
     """Unlikelihood of every recording at every lag, with the bodies of these fits."""
     together = score.together
-    costs = np.zeros((len(chosen), len(LAGS)))
+    costs = np.zeros((len(chosen), len(shifted)))
     rows = np.arange(len(place))
     for j, use, fit in zip(together.joints, together.rows, fitted, strict=True):
         predicted = shifted[chosen[place], rows, j][use] - fit.residual
