@@ -345,7 +345,7 @@ def sure(finding: Finding) -> str:
 
 def sizes(finding: Finding) -> str:
     """The parameters of a finding with their intervals, ``"k = 3.50 ± 0.40 N m/rad"``."""
-    parts = zip(_parameters(finding)[0], _shown(finding), strict=True)
+    parts = zip(_parameters(finding)[0], _shown(finding).values(), strict=True)
     # a form that was chosen, such as the side of a plane, is no size
     told = [part for part, row in parts if row["unit"] or row["low"] is not None]
     return ", ".join(told[: _told(finding)])
@@ -357,17 +357,15 @@ def _told(finding: Finding) -> int:
     return TOLD[min(len(finding.joints), 3) if apart else 1]
 
 
-def _shown(finding: Finding) -> list[dict[str, Any]]:
-    """Values of the parameters that have a text."""
-    return [row for name, row in finding.parameters.items() if name not in UNTOLD]
+def _shown(finding: Finding) -> dict[str, dict[str, Any]]:
+    """The parameters that have a text."""
+    return {name: row for name, row in finding.parameters.items() if name not in UNTOLD}
 
 
 def _parameters(finding: Finding) -> tuple[list[str], list[float]]:
     """Text of parameters, and distance of each from zero in half widths of its interval."""
     parts, weights = [], []
-    for name, row in finding.parameters.items():
-        if name in UNTOLD:
-            continue
+    for name, row in _shown(finding).items():
         values = row["value"] if isinstance(row["value"], list) else [row["value"]]
         lows, highs = (
             row[key] if isinstance(row[key], list) else [row[key]] * len(values)

@@ -33,7 +33,7 @@ class _AtTool(NamelessEffect):
         return [
             shape | point
             for point in points_of_tool(signals)
-            for shape in self.tried(signals, tool_position(signals, **point))
+            for shape in self.tried(signals, tool_position(signals, point))
         ]
 
     def tried(self, signals: Signals, position: Array) -> list[dict[str, Any]]:
@@ -55,7 +55,7 @@ class FunctionOfToolPosition(_AtTool):
         return [_extent(position)] if signals.n_joints > 3 else []
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        position = tool_position(signals, shape.get("point", -1))
+        position = tool_position(signals, shape)
         return _polynomials(position, shape["low"], shape["high"], 4)
 
 
@@ -81,10 +81,9 @@ class DragOnTool(_ForceAtTool):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        point = shape.get("point", -1)
-        height = tool_position(signals, point)[:, 2]
+        height = tool_position(signals, shape)[:, 2]
         field = splines(height, shape["low"], shape["high"], len(self.coefficients))
-        jacobian = tool_jacobian(signals, point)
+        jacobian = tool_jacobian(signals, shape)
         velocity = np.einsum("ian,in->ia", jacobian, signals.dq)
         return {j: np.sum(jacobian[:, :, j] * velocity, axis=1)[:, None] * field for j in joints}
 
@@ -103,9 +102,8 @@ class ForceOverToolPosition(_ForceAtTool):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        point = shape.get("point", -1)
-        field = _polynomials(tool_position(signals, point), shape["low"], shape["high"], 2)
-        jacobian = tool_jacobian(signals, point)
+        field = _polynomials(tool_position(signals, shape), shape["low"], shape["high"], 2)
+        jacobian = tool_jacobian(signals, shape)
         return {
             j: np.hstack([-jacobian[:, axis, [j]] * field for axis in range(3)]) for j in joints
         }
@@ -133,17 +131,16 @@ class ForceNearPoint(_ForceAtTool):
         ]
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        position = tool_position(signals, shape.get("point", -1))
+        position = tool_position(signals, shape)
         return float(np.max(np.ptp(position, axis=0)))
 
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        touched = shape.get("point", -1)
         place = np.array([shape[axis] for axis in "xyz"])
-        away = (tool_position(signals, touched) - place) / max(shape["width"], 1e-9)
+        away = (tool_position(signals, shape) - place) / max(shape["width"], 1e-9)
         near = np.exp(-0.5 * np.einsum("ia,ia->i", away, away))[:, None]
-        jacobian = tool_jacobian(signals, touched)
+        jacobian = tool_jacobian(signals, shape)
         radial = np.einsum("iaj,ia->ij", jacobian, away)
         columns = {}
         for j in joints:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _ANOTHER_POINT = 0.01
 
 
-def tip(robot: Robot) -> str | None:
+def _tip(robot: Robot) -> str | None:
     """Name of the link farthest from the origin of the last body to which it is fixed.
 
     That of a tool or a flange, by which a robot touches its environment; None if there is none.
@@ -39,13 +39,13 @@ def tip(robot: Robot) -> str | None:
 def points_of_tool(signals: Signals) -> list[dict[str, str]]:
     """Shapes of the points at which something may touch the tool: its origin, and its tip."""
     assert signals.robot is not None
-    name = tip(signals.robot)
+    name = _tip(signals.robot)
     return [{}] if name is None else [{}, {"point": name}]
 
 
-def _tool_pose(signals: Signals, point: str | int = -1) -> tuple[Array, Array]:
+def _tool_pose(signals: Signals, shape: Mapping[str, Any]) -> tuple[Array, Array]:
     """Position and orientation of the tool, (n_samples, 3) and (n_samples, 3, 3), computed once."""
-    robot = signals.robot
+    robot, point = signals.robot, shape.get("point", -1)
     assert robot is not None
     pose: tuple[Array, Array] = signals.once(
         f"tool {point}", lambda: robot.forward_kinematics(signals.q, point)
@@ -53,22 +53,23 @@ def _tool_pose(signals: Signals, point: str | int = -1) -> tuple[Array, Array]:
     return pose
 
 
-def tool_position(signals: Signals, point: str | int = -1) -> Array:
-    """Position of the tool, (n_samples, 3), computed once for all shapes.
+def tool_position(signals: Signals, shape: Mapping[str, Any]) -> Array:
+    """Position of the tool in m, (n_samples, 3), computed once for all shapes.
 
     Parameters
     ----------
     signals : Signals
         Motion and robot.
-    point : str or int, default=-1
-        Link that is taken for the tool; the last body by default.
+    shape : mapping
+        Shape of an effect; its ``point`` is the link that is taken for the tool. Without it, that
+        is the last body.
     """
-    return _tool_pose(signals, point)[0]
+    return _tool_pose(signals, shape)[0]
 
 
-def tool_jacobian(signals: Signals, point: str | int = -1) -> Array:
+def tool_jacobian(signals: Signals, shape: Mapping[str, Any]) -> Array:
     """Its velocity per unit joint velocity, (n_samples, 3, n_joints), computed once."""
-    robot = signals.robot
+    robot, point = signals.robot, shape.get("point", -1)
     assert robot is not None
     jacobian: Array = signals.once(
         f"tool jacobian {point}",
@@ -214,19 +215,19 @@ class ExternalWrench(_ToolEffect):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        parts = [tool_jacobian(signals, shape.get("point", -1)), _turning_jacobian(signals)]
+        parts = [tool_jacobian(signals, shape), _turning_jacobian(signals)]
         if "on_tool" in shape:
-            orientation = _tool_pose(signals)[1]
+            orientation = _tool_pose(signals, {})[1]
             parts = [np.einsum("iab,iaj->ibj", orientation, part) for part in parts]
         return {j: -np.hstack([part[:, :, j] for part in parts]) for j in joints}
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        orientation = _tool_pose(signals)[1]
+        orientation = _tool_pose(signals, {})[1]
         turns = np.ptp(orientation, axis=0).max(initial=0.0) > _LEAST_TURN
         return super().grid(signals, joints) if turns else [{}]
 
     def elsewhere(self, signals: Signals) -> list[dict[str, Any]]:
-        return [dict(point) for point in points_of_tool(signals) if point]
+        return list(points_of_tool(signals)[1:])
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
@@ -298,7 +299,7 @@ class EnvironmentContact(Effect):
         return [
             shape | point
             for point in points_of_tool(signals)
-            for shape in self._grid_of(tool_position(signals, **point))
+            for shape in self._grid_of(tool_position(signals, point))
         ]
 
     def _grid_of(self, position: Array) -> list[dict[str, Any]]:
@@ -337,12 +338,12 @@ class EnvironmentContact(Effect):
         return bool(FEWEST_TOUCHING < np.mean(_depth(signals, shape) > 0) < MOST_TOUCHING)
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        return float(np.ptp(tool_position(signals, shape.get("point", -1)) @ _normal(shape)))
+        return float(np.ptp(tool_position(signals, shape) @ _normal(shape)))
 
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        jacobian = tool_jacobian(signals, shape.get("point", -1))
+        jacobian = tool_jacobian(signals, shape)
         reach = np.einsum("ian,a->in", jacobian, _normal(shape))
         pressure = _depth(signals, shape) ** shape.get("power", 1.0)
         if "damping" in shape:
@@ -368,7 +369,7 @@ def _normal(shape: Mapping[str, Any]) -> Array:
 
 def _depth(signals: Signals, shape: Mapping[str, Any]) -> Array:
     """Depth of the tool in a plane in m, 0 outside, shape (n_samples,)."""
-    position, normal = tool_position(signals, shape.get("point", -1)), _normal(shape)
+    position, normal = tool_position(signals, shape), _normal(shape)
     if "azimuth" in shape:
         position = position - np.array([shape[axis] for axis in "xyz"])
         return np.asarray(np.maximum(0.0, shape["z0"] - position @ normal))

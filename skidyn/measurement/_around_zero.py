@@ -14,7 +14,6 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import position_step
-from skidyn.measurement._reading import Reading
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
 
@@ -145,9 +144,7 @@ def _without(torque: Array, pull: Array, parts: Sequence[Rows]) -> list[int]:
 def _felt(fits: Fits, joint: int) -> bool:
     """Whether the torque of a joint contains changes of gravity, in addition to other parts."""
     torque, counts = fits.mean_torque(joint)
-    still, pulls = fits.gravity_parts(Reading())
-    pull = np.tensordot(fits.robot.gravity, pulls, 1)
-    _, speed, sign, _ = fits.columns(Reading()).transpose(1, 0, 2)
+    pull, still, speed, sign = fits.read_columns()
     table = np.column_stack([torque, *(x[:, joint] for x in (pull, still, speed, sign))])[counts]
     runs = fits.recording[counts]
     for run in np.unique(runs):

@@ -177,11 +177,12 @@ def _turned_trajectories(
 
 def _alternate(measurement: Measurement) -> bool:
     """Whether every second row of all recordings, and the others, are in the order of time."""
-    s = measurement.signals
-    begins = np.maximum.accumulate(np.where(np.r_[True, ~s.within], np.arange(s.n_samples), 0))
-    second = (np.arange(s.n_samples) - begins) % 2 == 1
+    s, used = measurement.signals, _used(measurement)
+    second = np.zeros(s.n_samples, dtype=bool)
+    for own in s.segments:
+        second[own][1::2] = True
     for rows in (second, ~second):
-        found = _steps_of(s.take(rows), measurement.unwrapped[rows], _used(measurement))
+        found = _steps_of(s.take(rows), measurement.unwrapped[rows], used)
         if found is None or found.disorder > ORDERLY:
             return False
         if np.mean(found.steps[found.moving] < -WHOLE) > BACKWARDS:

@@ -377,6 +377,15 @@ class Fits:
 
         return self._of_motion.get("gravity", motion, parts, 1)
 
+    def read_columns(self) -> tuple[Array, Array, Array, Array]:
+        """Mean torques of gravity and of the rest of the stated bodies, velocity and its sign.
+
+        As recorded; of shape (n_rows, n_joints) each.
+        """
+        still, pulls = self.gravity_parts(Reading())
+        _, speed, sign, _ = self.columns(Reading()).transpose(1, 0, 2)
+        return np.tensordot(self.robot.gravity, pulls, 1), still, speed, sign
+
     def identified(self, reading: Reading) -> Outcome:
         """Fit with identified bodies, common to all joints."""
 

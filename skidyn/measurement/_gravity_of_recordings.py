@@ -91,9 +91,7 @@ def gravity_shares(fits: Fits) -> dict[int, float]:
     fits : Fits
         Rows.
     """
-    still, pulls = fits.gravity_parts(Reading())
-    pull = np.tensordot(fits.robot.gravity, pulls, 1)
-    _, speed, sign, _ = fits.columns(Reading()).transpose(1, 0, 2)
+    pull, still, speed, sign = fits.read_columns()
     found = {}
     for run in np.unique(fits.recording).tolist():
         along = square = 0.0

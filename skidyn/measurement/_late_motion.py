@@ -65,12 +65,14 @@ def find_late_motion(score: Score, common: float) -> LateMotion | None:
     if not score.joints:
         return None
     here = together.left(fits.torque, score.plain)
+    of_torque = fits.average(fits.torque_at(SLOPE) - fits.torque) / SLOPE
     promised = {}
     for k in score.joints:
         moved = together.moved(_shifted(together.signals, k, SLOPE))
-        for with_torque in (False, True):
-            left = moved.left(_torque(fits, k, SLOPE, with_torque), score.plain)
-            promised[k, with_torque] = score.promise(fits.average(here - left) / SLOPE)
+        slope = fits.average(here - moved.left(fits.torque, score.plain)) / SLOPE
+        promised[k, False] = score.promise(slope)
+        slope[:, score.joints.index(k)] -= of_torque[:, k]
+        promised[k, True] = score.promise(slope)
     k, with_torque = max(promised, key=lambda what: promised[what][0])
     promise, first = promised[k, with_torque]
     if promise < LEAST:

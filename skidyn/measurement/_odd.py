@@ -16,7 +16,7 @@ from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
 from skidyn.measurement._fits import Fits
 from skidyn.measurement._gains import USUAL
-from skidyn.measurement._late_runs import late_runs
+from skidyn.measurement._lags_of_recordings import lags_of_recordings
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd_order import find_exchanges
 from skidyn.measurement._peak import climb
@@ -146,7 +146,7 @@ class OddRecording(Check):
             asked = asked_gain(measurement, seen.fits)
             shifted = {run: zero for run, zero in shifted.items() if zero[2] > asked}
             scaled = [one for one in scaled if one.gain > asked]
-        if (scaled or unlike or shifted) and late_runs(measurement) is not None:
+        if (scaled or unlike or shifted) and lags_of_recordings(measurement) is not None:
             return  # their torques are of other times
         measurement.odd = bool(scaled or unlike or shifted)
         for run, (joint, angle, gain) in shifted.items():

@@ -13,9 +13,9 @@ from skidyn.measurement._delay import Delay, RunDelay, find_delay
 from skidyn.measurement._drift import Drift, find_drift
 from skidyn.measurement._fits import Fits
 from skidyn.measurement._joint_fit import lag_gain, refined_lag
+from skidyn.measurement._lags_of_recordings import LagsOfRecordings, lags_of_recordings
 from skidyn.measurement._late_motion import LateMotion, find_late_motion
 from skidyn.measurement._late_run import LateRun, find_late_run
-from skidyn.measurement._late_runs import LateRuns, late_runs as lags_of_runs
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import is_short
@@ -87,7 +87,7 @@ class TorqueDelay(Check):
             known = not (drift.is_of_log or len(measurement.leaps))
             yield self._drifting(found, drift if known and _is_sure(drift) else None)
             return
-        apart = lags_of_runs(measurement)
+        apart = lags_of_recordings(measurement)
         if apart is not None:
             yield from self._of_runs(apart)
             return
@@ -164,7 +164,7 @@ class TorqueDelay(Check):
             return
         yield from self._of_joints(measurement, fits, found)
 
-    def _of_runs(self, found: LateRuns) -> Iterator[Suspicion]:
+    def _of_runs(self, found: LagsOfRecordings) -> Iterator[Suspicion]:
         """Recordings that have lags of their own, or a few of them."""
         usual = float(np.median(list(found.lags.values())))
         odd = {run: lag - usual for run, lag in found.lags.items() if abs(lag - usual) > APART}

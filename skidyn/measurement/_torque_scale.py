@@ -66,7 +66,7 @@ class TorqueScale(Check):
         values = np.array(list(gains.values()))
         sure = np.array(list(known.values()))
         rate = asked_rate(measurement, fits)
-        if rate is not None and rate < STATIC:
+        if rate is not None and rate <= STATIC:
             return  # the torque contains gravity only
         if rate is not None:
             value = float(f"{rate:.4g}")

@@ -32,7 +32,7 @@ APART = 0.02
 
 
 @dataclass(frozen=True)
-class LateRuns:
+class LagsOfRecordings:
     """Lags of the torque in recordings.
 
     Attributes
@@ -50,15 +50,15 @@ class LateRuns:
     left: float
 
 
-def late_runs(measurement: Measurement) -> LateRuns | None:
+def lags_of_recordings(measurement: Measurement) -> LagsOfRecordings | None:
     """Lags of the recordings of a measurement; None if they have a common one, or none."""
     fits = readable_fits(measurement)
     if fits is None or measurement.stale:
         return None
-    return measurement.once("late_runs", lambda: find_late_runs(Score(fits.loaded())))
+    return measurement.once("lags_of_recordings", lambda: find_lags(Score(fits.loaded())))
 
 
-def find_late_runs(score: Score) -> LateRuns | None:
+def find_lags(score: Score) -> LagsOfRecordings | None:
     """Lags of recordings that explain all torques better than a common one; None if none do.
 
     Parameters
@@ -102,7 +102,9 @@ def find_late_runs(score: Score) -> LateRuns | None:
     several = len(gains) < 2 or gains.max() < ALONE * gain
     if gain < SURE + EACH * len(runs) or not several or min(left) > LEFT:
         return None
-    return LateRuns(dict(zip(runs.tolist(), lags.tolist(), strict=True)), gain, float(min(left)))
+    return LagsOfRecordings(
+        dict(zip(runs.tolist(), lags.tolist(), strict=True)), gain, float(min(left))
+    )
 
 
 def _of_common(score: Score, shifted: Array) -> tuple[int, list[RobustFit]]:
