@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 SIGN_BLUR = 0.003
 #: A time step longer than this many median steps is a gap.
 GAP_STEPS = 5.0
+#: Whole trajectories are held out if there are more than this many, else blocks of them: at least
+#: two of each, and this many together.
+FEW_TRAJECTORIES, FEWEST_BLOCKS = 6, 8
 #: Standard deviation of a normal distribution over the median of its absolute values.
 MAD = 1.4826
 
@@ -44,6 +47,17 @@ def find_segments(trajectory: NDArray[Any], time: Array | None = None) -> list[s
         ]
         edges = np.unique(np.concatenate([edges, *gaps])).tolist()
     return [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+
+def blocks_held_out(n_trajectories: int) -> int:
+    """Number of blocks of every trajectory that are held out one at a time.
+
+    >>> blocks_held_out(12), blocks_held_out(5), blocks_held_out(1)
+    (1, 2, 8)
+    """
+    if n_trajectories > FEW_TRAJECTORIES:
+        return 1
+    return max(2, -(-FEWEST_BLOCKS // max(1, n_trajectories)))
 
 
 def scatter(values: Array, axis: int | None = None) -> Any:

@@ -20,7 +20,7 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._ranking import RankingSearch
-from skidyn.diagnosis._rule import NEARER
+from skidyn.diagnosis._rule import NEARER, STANDS_OUT
 from skidyn.effects import NamelessEffect, get_effect
 from skidyn.evidence import weighted_least_squares
 
@@ -134,9 +134,11 @@ class ChoosingSearch(RankingSearch):
 
     def _as_good(self, plain: Array, errors: Array, further: Hypothesis) -> bool:
         """Whether a plain formula leaves little enough of what a further form removes."""
-        left = errors.sum(0)
+        left, own = errors.sum(0), list(further.joints)
+        if (plain.sum(0)[own] > STANDS_OUT * left[own]).any():
+            return False
         removed = left * np.expm1(np.maximum(further.gain, 0) / self._counts)
-        return self._good_enough(plain.sum(0), left, removed, further.joints)
+        return self._good_enough(plain.sum(0), left, removed, own)
 
     def _encompassed(self, best: Hypothesis, rival: Hypothesis) -> bool:
         """Whether a simpler explanation encompasses a further form [1]_.

@@ -36,7 +36,6 @@ from skidyn.diagnosis._hypothesis import (
     Hypothesis,
     SearchResult,
     found_terms,
-    on_samples,
 )
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._limits import Limit
@@ -295,7 +294,8 @@ def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> 
     ]
     if not nameless:
         return []
-    rest = [t for t in terms if not on_samples(t)]
+    lines = {c.term for h in result.findings if h.torque is not None for c in h.candidates}
+    rest = [t for t in terms if t not in lines]
     bare = replace_torque(problem, problem.torque - result.ripple)
     return describe_unknowns(bare, rest, nameless, result.fit.noise)
 
@@ -303,18 +303,15 @@ def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> 
 def _held_out(
     problem: Problem, terms: Sequence[Term], result: SearchResult, keep: Sequence[Term]
 ) -> tuple[Array, dict[Term, dict[int, Array]]]:
-    """Held-out residual; a line's coefficients come from the residual at the full rate."""
-    waves = [t for t in terms if on_samples(t)]
-    rest = [t for t in terms if not on_samples(t)]
-    if not waves:
-        return held_out_residual(problem, rest, result.fit.sigma, keep)
-    torque = problem.torque - result.ripple
-    bare = replace_torque(problem, torque)
+    """Held-out residual; the torque of a line that was found comes from every sample."""
+    lines = [h for h in result.findings if h.torque is not None and h.candidates[0].term in terms]
+    waves = {c.term for h in lines for c in h.candidates}
+    rest = [t for t in terms if t not in waves]
+    torque = problem.torque - sum((h.torque for h in lines), np.zeros_like(problem.torque))
+    bare = replace_torque(problem, torque) if lines else problem
     residual, held = held_out_residual(bare, rest, result.fit.sigma, keep)
-    for hypothesis in result.findings:
-        if hypothesis.torque is None:
-            continue
-        for t in (c.term for c in hypothesis.candidates if c.term in waves):
+    for hypothesis in lines:
+        for t in (c.term for c in hypothesis.candidates):
             held[t] = {t.places[0]: hypothesis.torque[:, t.places[0]]}
     return residual, held
 

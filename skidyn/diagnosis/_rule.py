@@ -90,6 +90,10 @@ BEYOND_FORMULAS = 0.5
 #: Of explanations that the data cannot separate, one is preferred with which the torque of the
 #: identified bodies differs from that of the described ones by less than this share of the others.
 NEARER = 0.5
+#: A plain formula is not as good as a further form of another effect if it leaves more than this
+#: multiple of the squared error: where an effect is much larger than the noise, what its imperfect
+#: formula may leave is, too.
+STANDS_OUT = 4.0
 #: Share of the best score from which other forms of another kind are tried, and another pair of
 #: joints of a coupling is told with the best one (``_ranking.py``, ``_acceptance.py``).
 NEARLY = 0.9

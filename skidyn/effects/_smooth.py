@@ -10,11 +10,12 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 
-from skidyn._signals import Array, Signals
+from skidyn._signals import Array, Signals, blocks_held_out
 
 #: Share of the samples of a trajectory left out at either end of its range.
 _OUTSIDE = 0.002
-#: Number of trajectories that must reach a value for a function to be fitted there.
+#: Number of trajectories, or of blocks that are held out, that must reach a value for a function to
+#: be fitted there.
 _REACHING = 3
 #: Share of the range over which the secant is computed that continues a function beyond it.
 _SECANT = 0.15
@@ -64,14 +65,17 @@ def splines(x: Array, low: float, high: float, count: int) -> Array:
 
 
 def supported_range(signals: Signals, x: Array) -> tuple[float, float]:
-    """Range of a signal that several trajectories cover, so that no single one decides."""
+    """Range of a signal that several trajectories cover, so that no single one decides.
+
+    In a log of few trajectories, blocks of them are held out, and count instead.
+    """
     (found,) = supported_ranges(signals, x[:, None])
     return found
 
 
 def supported_ranges(signals: Signals, x: Array) -> list[tuple[float, float]]:
     """:func:`supported_range` of several signals, shape (n_samples, n_signals)."""
-    rows = signals.once("rows of trajectories", lambda: _rows_of_trajectories(signals))
+    rows = signals.once("rows held out", lambda: _rows_held_out(signals))
     ends = np.array([np.quantile(x[own], [_OUTSIDE, 1 - _OUTSIDE], axis=0) for own in rows])
     ends.sort(axis=0)
     at = min(_REACHING, (len(ends) + 1) // 2) - 1
@@ -83,8 +87,15 @@ def supported_ranges(signals: Signals, x: Array) -> list[tuple[float, float]]:
     ]
 
 
-def _rows_of_trajectories(signals: Signals) -> list[NDArray[np.int64]]:
-    return [np.flatnonzero(signals.trajectory == k) for k in np.unique(signals.trajectory)]
+def _rows_held_out(signals: Signals) -> list[NDArray[np.int64]]:
+    names = np.unique(signals.trajectory)
+    blocks = blocks_held_out(len(names))
+    return [
+        part
+        for k in names
+        for part in np.array_split(np.flatnonzero(signals.trajectory == k), blocks)
+        if len(part)
+    ]
 
 
 def continued(functions: Callable[[Array], Array], x: Array, low: float, high: float) -> Array:

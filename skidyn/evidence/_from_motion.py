@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from skidyn._exceptions import SkidynError
-from skidyn._signals import Array, Signals
+from skidyn._signals import Array, Signals, blocks_held_out
 from skidyn.effects import Term
 from skidyn.evidence._evidence import Evidence, Key
-from skidyn.evidence._motion_rows import FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS
+from skidyn.evidence._motion_rows import MOST_FOLDS
 from skidyn.evidence._streaming import linear_terms
 from skidyn.robots import BaseParameters, Robot, find_base_parameters
 
@@ -176,9 +176,7 @@ def sample_blocks(
         Fold of every block, from 0.
     """
     names, index, counts = np.unique(trajectory, return_inverse=True, return_counts=True)
-    blocks = 1
-    if len(names) <= FEW_TRAJECTORIES:
-        blocks = max(2, -(-FEWEST_BLOCKS // len(names)))
+    blocks = blocks_held_out(len(names))
     order = np.argsort(index, kind="stable")
     within = np.empty(len(index), dtype=np.int64)
     within[order] = np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)

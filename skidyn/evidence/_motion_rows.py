@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array, Signals
+from skidyn._signals import Array, Signals, blocks_held_out
 from skidyn.evidence._broken import without_broken
 from skidyn.evidence._kinematics import smooth_motion
 from skidyn.evidence._rows import (
@@ -21,8 +21,8 @@ from skidyn.evidence._rows import (
     window_rows,
 )
 
-#: Folds are whole trajectories if there are more than this many, else blocks of them.
-FEW_TRAJECTORIES, FEWEST_BLOCKS, MOST_FOLDS = 6, 8, 20
+#: Most folds: of more trajectories, several are held out together.
+MOST_FOLDS = 20
 #: Share of the smoother's half width that is left out around rest and reversals, and number of
 #: samples left out where a model of hysteresis describes the motion between the two.
 MARGIN, SHORT_MARGIN = 0.75, 1
@@ -83,8 +83,8 @@ def _half_window(rate: float) -> float:
 def _folds(rows: Rows, guard: float) -> tuple[Rows, list[NDArray[np.int64]], int, bool]:
     """Assign rows to folds and sort them; blocks of few trajectories lose the rows at borders."""
     names = np.unique(np.concatenate(rows.trajectory))
-    whole = len(names) > FEW_TRAJECTORIES
-    blocks = 1 if whole else max(2, -(-FEWEST_BLOCKS // max(1, len(names))))
+    blocks = blocks_held_out(len(names))
+    whole = blocks == 1
     ends = {}
     for name in names:
         times = np.concatenate(
