@@ -109,7 +109,8 @@ GUESS = 0.5
 #: Below this confidence, it is not a finding whatever it removes.
 UNLIKELY = 0.02
 #: The only finding, if it removes a larger share and only noise is left, is reported as the most
-#: likely effect even with a lower confidence.
+#: likely effect even with a lower confidence; what removes less has to be likely by itself, also if
+#: other explanations are equally good.
 MUCH = 0.1
 #: An effect that removes a smaller share of the error of samples is a finding only with this
 #: confidence: in generated logs, such effects with a lower confidence were wrong

@@ -34,6 +34,7 @@ from skidyn.diagnosis._rule import (
     CHANGE_SHARE,
     GUESS,
     LITTLE,
+    MUCH,
     SURE_OF_LITTLE,
     UNLIKELY,
     false_discovery_rate,
@@ -222,10 +223,11 @@ def slight(
 def guess(diagnosis: Diagnosis) -> Withdrawal | None:
     """The last finding with terms that are more likely wrong than right, and these terms.
 
-    If an explanation on other joints, or another one on the same joints, is equally good, one of
-    the two is right, and both are reported. A finding that removes most of an error is kept as its
-    best explanation unless it is unlikely, as is (in :func:`conclude`) one that removes much of it
-    where all else is noise; one that removes very little needs a high confidence. An effect whose
+    If an explanation of much of an error on other joints, or another one on the same joints, is
+    equally good, one of the two is right, and both are reported. A finding that removes most of an
+    error is kept as its best explanation unless it is unlikely, as is (in :func:`conclude`) one
+    that removes much of it where all else is noise; one that removes less has to be likely by
+    itself, and one that removes very little needs a high confidence. An effect whose
     times were chosen has to be constant within them: otherwise they only show where the error of
     another effect is large. One that another formula of another finding would explain has to be
     likely by itself.
@@ -238,11 +240,12 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
             return finding.confidence is None or finding.confidence >= GUESS
         of_kind = [f for f in diagnosis.findings if f.kind == finding.kind]
         likely = finding.confidence or 1.0
-        if finding.kind != UNKNOWN:
-            likely = of_significant(likely, min(f.q_value or 0.0 for f in of_kind))
-        equalled = bool(finding.rivals) and finding.margin < ABOVE
-        likely *= (1 + finding.alike + equalled) * (1 + len(finding.elsewhere))
         drop = max(f.error_drop for f in of_kind)
+        if drop >= MUCH:
+            if finding.kind != UNKNOWN:
+                likely = of_significant(likely, min(f.q_value or 0.0 for f in of_kind))
+            equalled = bool(finding.rivals) and finding.margin < ABOVE
+            likely *= (1 + finding.alike + equalled) * (1 + len(finding.elsewhere))
         little = LITTLE * _share_of_samples(diagnosis.problem, finding.trajectories)
         if drop < little and likely < SURE_OF_LITTLE:
             return False

@@ -114,11 +114,25 @@ def continued(functions: Callable[[Array], Array], x: Array, low: float, high: f
 
 
 def ordered_functions(x: Array, sign: Array | None, low: float, high: float) -> Array:
-    """Functions of one signal by rising order, the constant first."""
+    """Functions of one signal by rising order, the constant first, continued as :func:`continued`.
+
+    Those of a velocity are powers with its direction, smooth around rest.
+    """
     if sign is None:
         inside = (2 * x - low - high) / max(high - low, 1e-300)
         return continued(lambda t: np.asarray(legvander(t, HIGHEST_ORDER)), inside, -1.0, 1.0)
-    v = np.clip(x / max(-low, high, 1e-300), -1.0, 1.0)
+    v = x / max(-low, high, 1e-300)
+    inside = np.clip(v, -1.0, 1.0)
+    columns = _powers(inside, sign)
+    for side in (-1.0, 1.0):
+        rows = np.flatnonzero(side * v > 1.0)
+        if len(rows):
+            edge, inner = _powers(side * np.array([1.0, 1 - 2 * _SECANT]), np.full(2, side))
+            columns[rows] += np.outer((side * v[rows] - 1.0) / (2 * _SECANT), edge - inner)
+    return columns
+
+
+def _powers(v: Array, sign: Array) -> Array:
     size = np.abs(v)
     powers = [np.ones_like(v), v, sign, size, v * v, v * size, v**3, size**3]
     powers += [sign * size ** (0.5 * k) for k in range(1, HIGHEST_ORDER - len(powers) + 2)]
