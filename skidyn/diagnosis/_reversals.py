@@ -64,7 +64,7 @@ def look_at_reversals(
     others = [h for h in result.findings if not _is_hysteresis(h.kind)]
     room = settings.max_findings - len(others)
     # A delayed torque is late at every reversal, for any friction.
-    lags = any(h.kind == "time_delay" for h in others)
+    lags = "time_delay" in [t.kind for t in problem.terms] + [h.kind for h in others]
     if not family or room < 1 or lags or problem.signals.time is None:
         return problem, result
     own = set(hysteresis_joints(problem.terms))

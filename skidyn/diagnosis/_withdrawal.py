@@ -239,7 +239,9 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
         if finding.instead is not None:
             return finding.confidence is None or finding.confidence >= GUESS
         of_kind = [f for f in diagnosis.findings if f.kind == finding.kind]
-        likely = finding.confidence or 1.0
+        likely = 1.0 if finding.confidence is None else finding.confidence
+        if likely < UNLIKELY:
+            return False
         drop = max(f.error_drop for f in of_kind)
         if drop >= MUCH:
             if finding.kind != UNKNOWN:
@@ -249,7 +251,7 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
         little = LITTLE * _share_of_samples(diagnosis.problem, finding.trajectories)
         if drop < little and likely < SURE_OF_LITTLE:
             return False
-        return likely >= GUESS or (finding.error_drop >= GUESS and likely >= UNLIKELY)
+        return likely >= GUESS or finding.error_drop >= GUESS
 
     sure = {term: is_sure(f) for f in diagnosis.findings for term in f.terms}
     for hypothesis in reversed(diagnosis.result.findings):
