@@ -48,21 +48,26 @@ class BaseTilt(Effect):
         robot = signals.robot
         assert robot is not None
         rest = np.zeros_like(signals.q)  # the symbolic robot of a simulation has no gravity_torque
-        parts = [
-            robot.inverse_dynamics(
-                signals.q,
-                rest,
-                rest,
-                parameters=signals.inertial_parameters,
-                gravity=np.eye(3)[axis],
-            )
-            for axis in self._horizontal(robot.gravity)
-        ]
+
+        def pulls(q: Array) -> list[Array]:
+            return [
+                robot.inverse_dynamics(
+                    q, rest, rest, parameters=signals.inertial_parameters, gravity=np.eye(3)[axis]
+                )
+                for axis in self._horizontal(robot.gravity)
+            ]
+
+        parts = pulls(signals.q)
         pull = np.abs(robot.inverse_dynamics(signals.q, rest, rest))
         upright = pull[:, 0].max(initial=0.0) < UPRIGHT * pull.max(initial=1e-9)
         first = np.zeros((signals.n_samples, 2))
         if not signals.prismatic[0] and upright:
             first = np.column_stack([np.cos(signals.q[:, 0]), np.sin(signals.q[:, 0])])
+            # The first moments that turn with the first joint are these coefficients. Those of the
+            # model are arbitrary: they may be tons at a lever of a tenth of a millimetre.
+            turned = pulls(np.column_stack([signals.q[:, 0], rest[:, 1:]]))
+            for part, fixed in zip(parts, turned, strict=True):
+                part[:, 0] -= fixed[:, 0]
         columns = {j: np.column_stack([*(p[:, j] for p in parts), 0 * first]) for j in joints}
         columns[0][:, 2:] = first
         return columns

@@ -18,11 +18,11 @@ from skidyn._progress import tell
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, TermSum, get_effect
 from skidyn.evidence._fit import Fit, FittedAlone, fit_weighted
-from skidyn.evidence._folds import RIDGE, nearest_folds
+from skidyn.evidence._folds import nearest_folds
 from skidyn.evidence._motion_rows import RowsAndFolds, read_motion, rows_and_folds
 from skidyn.evidence._rigid_rows import independent_columns, regressor_rows
 from skidyn.evidence._rows import WINDOW, Rows, averaged, interpolation
-from skidyn.robots import Robot, base_parameter_index, usual_changes
+from skidyn.robots import Robot, base_parameter_index
 
 #: Samples per window that are enough for a smooth function; at first, others are omitted.
 ENOUGH_SAMPLES = 16
@@ -304,29 +304,6 @@ class Problem:
         correction = self.correction(fit.coefficients)
         return self.robot.inertial_parameters + correction
 
-    def likely_bodies(self, fit: Fit) -> Array | None:
-        """Rigid-body parameters of a fit, with what the data leaves open as in the URDF.
-
-        The mass of a link whose axis is nearly that of the joint before it may be tons. No motion
-        shows it, but an effect that moves the base or the link makes a large torque of it. The most
-        likely parameters if those of the URDF are uncertain by their own size.
-        """
-        n = len(self.rigid_index)
-        if self.robot is None or not n:
-            return self.inertial_parameters(fit)
-        design = self.design([self.term_rows(t) for t in fit.terms])
-        parts = zip(design, fit.sigma, strict=True)
-        gram = np.sum([(a / s).T @ (a / s) for a, s in parts], axis=0)
-        size = np.sqrt(np.diag(gram))
-        size[size == 0] = 1.0
-        prior = np.zeros(len(size))
-        places = np.searchsorted(base_parameter_index(self.robot), self.rigid_index)
-        prior[:n] = 1 / (usual_changes(self.robot)[places] * size[:n]) ** 2
-        unit = gram / size[:, None] / size
-        unit[np.diag_indices_from(unit)] += RIDGE
-        pull = np.linalg.solve(unit + np.diag(prior), prior * size * fit.coefficients)
-        return self.robot.inertial_parameters + self.correction(fit.coefficients - pull / size)
-
     def correction(self, coefficients: Array) -> Array:
         """Change of the rigid-body parameters that coefficients represent, (n_bodies, 10)."""
         assert self.robot is not None
@@ -386,7 +363,7 @@ class Problem:
             load=load,
             model_torque=lambda: torques()[0],
             smooth_torque=lambda: torques()[1],
-            inertial_parameters=self.likely_bodies(fit),
+            inertial_parameters=self.inertial_parameters(fit),
         )
         following = {k for k in {t.kind for t in self._cache} if get_effect(k).follows_fit}
         self._cache = {t: rows for t, rows in self._cache.items() if t.kind not in following}

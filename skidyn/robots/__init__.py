@@ -9,7 +9,6 @@ __all__ = ["BaseParameters", "Robot", "find_base_parameters"]
 # For other packages of skidyn; no part of the public interface.
 from skidyn.robots._base_parameters import (
     base_parameter_index as base_parameter_index,
-    usual_changes as usual_changes,
     with_whole_turns as with_whole_turns,
 )
 from skidyn.robots._symbols import (

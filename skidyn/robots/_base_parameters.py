@@ -22,8 +22,6 @@ from skidyn.robots._robot import Robot
 STATES, TOLERANCE = 400, 1e-9
 #: Error of the entries of a rotation whose angles were rounded to three decimals, and of numbers.
 ROUNDED, EXACT = 5e-4, 1e-8
-#: Mass and length of a body without any, as shares of those of the largest one.
-NO_MASS = 1e-3
 #: Factors of a combination smaller than this are due to rounding.
 NEGLIGIBLE = 1e-7
 
@@ -93,22 +91,6 @@ def find_base_parameters(robot: Robot) -> BaseParameters:
 def base_parameter_index(robot: Robot) -> NDArray[np.int64]:
     """Columns of the torque regressor that are linearly independent."""
     return _find(robot).index
-
-
-def usual_changes(robot: Robot) -> Array:
-    """Size of the base parameters' changes if all bodies change by their own size, (n_base,).
-
-    The size of a body without mass is a thousandth of the largest one.
-    """
-    bodies = np.asarray(robot.inertial_parameters, dtype=float)
-    largest = np.abs(bodies[:, 0]).max(initial=0.0) or 1.0
-    mass = np.maximum(np.abs(bodies[:, 0]), NO_MASS * largest)
-    spread = np.abs(bodies[:, [4, 7, 9]]).sum(1) / 2  # second moments about the origin
-    length = np.sqrt(spread / mass)
-    length = np.maximum(length, NO_MASS * (length.max(initial=0.0) or 1.0))
-    powers = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
-    sizes = mass[:, None] * length[:, None] ** powers
-    return np.asarray(np.hypot.reduce(_find(robot).regrouping * sizes.ravel(), axis=1))
 
 
 @lru_cache(maxsize=64)
