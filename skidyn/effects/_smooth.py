@@ -75,10 +75,10 @@ def supported_range(signals: Signals, x: Array) -> tuple[float, float]:
 
 def supported_ranges(signals: Signals, x: Array) -> list[tuple[float, float]]:
     """:func:`supported_range` of several signals, shape (n_samples, n_signals)."""
-    rows = signals.once("rows held out", lambda: _rows_held_out(signals))
+    rows, reaching = signals.once("rows held out", lambda: _rows_held_out(signals))
     ends = np.array([np.quantile(x[own], [_OUTSIDE, 1 - _OUTSIDE], axis=0) for own in rows])
     ends.sort(axis=0)
-    at = min(_REACHING, (len(ends) + 1) // 2) - 1
+    at = reaching - 1
     return [
         (float(low[at]), float(high[-1 - at]))
         if high[-1 - at] > low[at]
@@ -87,15 +87,13 @@ def supported_ranges(signals: Signals, x: Array) -> list[tuple[float, float]]:
     ]
 
 
-def _rows_held_out(signals: Signals) -> list[NDArray[np.int64]]:
+def _rows_held_out(signals: Signals) -> tuple[list[NDArray[np.int64]], int]:
+    """Rows of every trajectory or block, and the number of these that must reach a value."""
     names = np.unique(signals.trajectory)
     blocks = blocks_held_out(len(names))
-    return [
-        part
-        for k in names
-        for part in np.array_split(np.flatnonzero(signals.trajectory == k), blocks)
-        if len(part)
-    ]
+    every = [np.flatnonzero(signals.trajectory == k) for k in names]
+    parts = [part for own in every for part in np.array_split(own, blocks) if len(part)]
+    return parts, min(_REACHING, (len(names) + 1) // 2)
 
 
 def continued(functions: Callable[[Array], Array], x: Array, low: float, high: float) -> Array:
