@@ -174,6 +174,8 @@ def conclude(
     smooth = away_from_reversals(problem, result.fit.residual, sliding)
     # On a joint with a finding, large local residuals are errors of its imperfect formula.
     taken = {j for h in result.findings for c in h.candidates for j in c.rows}
+    inexact = [t for t in problem.terms if not t.effect.is_exact]
+    taken.update(j for t in inexact for j in problem.term_rows(t))
     share_held = np.array([np.inf if j in taken else EPISODE_LEAST_HELD for j in range(len(rmse))])
     episodes, inside = find_episodes(problem, smooth, least, share_held)
     if episodes:

@@ -352,7 +352,7 @@ def _search(
     If the clock is in doubt, there is no search for a ``vibration``, which may be due to the
     logger.
     """
-    result = search(problem, kinds, settings, vibration=vibration)
+    result = search(problem, kinds, settings, vibration=vibration, given=problem.terms)
     give_back()  # what the unknown functions took: the next searches need fewer columns
     wider, completed = look_at_reversals(problem, result, kinds, settings)
     if wider is problem:

@@ -78,7 +78,8 @@ def look_at_reversals(
     wider = with_reversals(problem, terms, joints)
     wider.torque = problem.torque - result.ripple
     gates = replace(settings, least_share=REVERSAL_LEAST_SHARE, max_findings=room)
-    second = search(wider, family, gates, nameless=False, joints=joints)
+    given = problem.terms
+    second = search(wider, family, gates, nameless=False, joints=joints, given=given)
     if not new & {j for h in second.findings for j in h.joints}:
         return problem, result
     wider = replace(wider, terms=problem.terms, torque=problem.torque)

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from skidyn.diagnosis._hypothesis import Hypothesis, SearchResult
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, SearchResult
 from skidyn.diagnosis._reconsideration import ReconsideringSearch
 from skidyn.diagnosis._rule import Settings
+from skidyn.effects import Term
 from skidyn.evidence import Problem
 
 
@@ -22,6 +24,7 @@ def search(
     vibration: bool = True,
     joints: Sequence[int] | None = None,
     earlier: Sequence[Hypothesis] = (),
+    given: Iterable[Term] = (),
 ) -> SearchResult:
     """Fit the model, and find the missing effects.
 
@@ -42,14 +45,28 @@ def search(
     earlier : sequence of Hypothesis, optional
         Findings of another search, whose terms are in the model: what removes little of what they
         removed may be an error of their formulas.
+    given : iterable of Term, optional
+        Effects of the user's model, for which the same holds if their formulas are not exact.
     """
     searcher = _Search(problem, kinds, settings, nameless)
     searcher.vibration &= vibration
     if joints is not None:
         searcher.pool = [c for c in searcher.pool if set(c.joints) <= set(joints)]
         searcher.nameless = False
-    searcher.earlier = list(earlier)
+    searcher.earlier = [*_as_found(problem, given), *earlier]
     return searcher.run()
+
+
+def _as_found(problem: Problem, terms: Iterable[Term]) -> list[Hypothesis]:
+    """Effects of the given model with imperfect formulas, as findings of an earlier search."""
+    found = []
+    for term in terms:
+        if not term.effect.is_exact:
+            kind = UNKNOWN if term.effect.nameless else term.kind
+            candidate = Candidate(kind, term, problem.term_rows(term))
+            gain = np.zeros(problem.n_joints)
+            found.append(Hypothesis(kind, (candidate,), gain, 0.0, term.width))
+    return found
 
 
 class _Search(ReconsideringSearch):

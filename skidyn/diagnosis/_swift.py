@@ -81,7 +81,10 @@ def look_at_swift(
         gates = replace(settings, max_findings=room, least_gain=least, size_share=size)
         slowed = {j for h in slow for c in h.candidates if c.term.effect.is_slow for j in c.joints}
         joints = [j for j in range(problem.n_joints) if j not in slowed]
-        moved = search(short, family, gates, nameless=False, joints=joints, earlier=slow)
+        given = problem.terms
+        moved = search(
+            short, family, gates, nameless=False, joints=joints, earlier=slow, given=given
+        )
         now = {j: h.kind for h in moved.findings for j in h.joints}
         fastest = [
             c.term.effect.fastest(c.term.shape) for h in moved.findings for c in h.candidates
@@ -97,7 +100,8 @@ def look_at_swift(
         beside = replace(problem, terms=TermSum((*problem.terms, *found)), _cache={})
         room = settings.max_findings - len(moved.findings)
         slower = [k for k in kinds if k not in family]
-        others = search(beside, slower, replace(settings, max_findings=room))
+        gates = replace(settings, max_findings=room)
+        others = search(beside, slower, gates, given=given)
         if _sites(others.findings) == _sites(slow):
             break
     known = terms_on_rows(others.findings)
