@@ -165,7 +165,7 @@ class Effect:
     def comes_and_goes(self) -> bool:
         """Whether it may act in some recordings only, unlike inertia and elasticity of the arm."""
         passing = self.drawn_against in ("q", "dq", "load") and not self.moves_link
-        return passing and self.search == "grid" and self.scope != "robot"
+        return passing and self.search == "grid" and (self.scope != "robot" or self.drifts)
 
     @property
     def form_names(self) -> frozenset[str]:
