@@ -306,16 +306,18 @@ def _held_out(
     problem: Problem, terms: Sequence[Term], result: SearchResult, keep: Sequence[Term]
 ) -> tuple[Array, dict[Term, dict[int, Array]]]:
     """Held-out residual; the torque of a line that was found comes from every sample."""
-    lines = [h for h in result.findings if h.torque is not None and h.candidates[0].term in terms]
-    waves = {c.term for h in lines for c in h.candidates}
+    torque, waves = problem.torque, {}
+    for hypothesis in result.findings:
+        line = hypothesis.torque
+        if line is None or hypothesis.candidates[0].term not in terms:
+            continue
+        torque = torque - line
+        places = [(c.term, c.term.places[0]) for c in hypothesis.candidates]
+        waves |= {term: {place: line[:, place]} for term, place in places}
     rest = [t for t in terms if t not in waves]
-    torque = problem.torque - sum((h.torque for h in lines), np.zeros_like(problem.torque))
-    bare = replace_torque(problem, torque) if lines else problem
+    bare = replace_torque(problem, torque) if waves else problem
     residual, held = held_out_residual(bare, rest, result.fit.sigma, keep)
-    for hypothesis in lines:
-        for t in (c.term for c in hypothesis.candidates):
-            held[t] = {t.places[0]: hypothesis.torque[:, t.places[0]]}
-    return residual, held
+    return residual, held | waves
 
 
 def _comparison(
