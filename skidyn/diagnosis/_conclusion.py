@@ -306,7 +306,8 @@ def _held_out(
     problem: Problem, terms: Sequence[Term], result: SearchResult, keep: Sequence[Term]
 ) -> tuple[Array, dict[Term, dict[int, Array]]]:
     """Held-out residual; the torque of a line that was found comes from every sample."""
-    torque, waves = problem.torque, {}
+    torque = problem.torque
+    waves: dict[Term, dict[int, Array]] = {}
     for hypothesis in result.findings:
         line = hypothesis.torque
         if line is None or hypothesis.candidates[0].term not in terms:
