@@ -163,7 +163,11 @@ class Effect:
 
     @property
     def comes_and_goes(self) -> bool:
-        """Whether it may act in some recordings only, unlike inertia and elasticity of the arm."""
+        """Whether it may act in some recordings only, unlike inertia and elasticity of the arm.
+
+        Of effects of the whole robot, those that may also change over the log, as a base that
+        sinks; a load has a search of its own.
+        """
         passing = self.drawn_against in ("q", "dq", "load") and not self.moves_link
         return passing and self.search == "grid" and (self.scope != "robot" or self.drifts)
 

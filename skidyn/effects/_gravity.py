@@ -50,10 +50,11 @@ class BaseTilt(Effect):
         rest = np.zeros_like(signals.q)  # the symbolic robot of a simulation has no gravity_torque
 
         def pulls(q: Array) -> list[Array]:
+            """Torque of 1 m/s^2 along each horizontal axis in some poses, N m or N."""
+            still = np.zeros_like(q)
+            own = signals.inertial_parameters
             return [
-                robot.inverse_dynamics(
-                    q, rest, rest, parameters=signals.inertial_parameters, gravity=np.eye(3)[axis]
-                )
+                robot.inverse_dynamics(q, still, still, parameters=own, gravity=np.eye(3)[axis])
                 for axis in self._horizontal(robot.gravity)
             ]
 
@@ -65,9 +66,10 @@ class BaseTilt(Effect):
             first = np.column_stack([np.cos(signals.q[:, 0]), np.sin(signals.q[:, 0])])
             # The first moments that turn with the first joint are these coefficients. Those of the
             # model are arbitrary: they may be tons at a lever of a tenth of a millimetre.
-            turned = pulls(np.column_stack([signals.q[:, 0], rest[:, 1:]]))
-            for part, fixed in zip(parts, turned, strict=True):
-                part[:, 0] -= fixed[:, 0]
+            quarter = np.zeros((2, signals.n_joints))
+            quarter[1, 0] = np.pi / 2  # cosine and sine of a torque that turns
+            for part, fixed in zip(parts, pulls(quarter), strict=True):
+                part[:, 0] -= first @ fixed[:, 0]
         columns = {j: np.column_stack([*(p[:, j] for p in parts), 0 * first]) for j in joints}
         columns[0][:, 2:] = first
         return columns
