@@ -7,24 +7,28 @@ import argparse
 import shlex
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any
 
 from skidyn._commands._arguments import command, with_log_only
 from skidyn._commands._input import read_frame, read_robot
 from skidyn._commands._output import print_json, working
 from skidyn._exceptions import LogWarning
 
+if TYPE_CHECKING:
+    from skidyn.logs import LogQuality
+
 DESCRIPTION = """\
-Check whether the signals of a log agree with their names and units. Problems are listed by their
+Check whether the signals of a log agree with their names and units. A table gives the rate, the
+resolution, and the range and number of reversals of each joint. Problems are then listed by their
 influence on the results, with evidence and the option that fixes each: failed reads, units, clock,
 repeated rows, and with a robot also signs and order of joints, gravity, torque without sign,
-currents taken for torques, and delay. A table then gives the rate, the resolution, and the range
-and number of reversals of each joint.
+currents taken for torques, and delay.
 
   skidyn check run1.csv run2.csv
   skidyn check run1.csv --urdf robot.urdf
 
-In this table, "at rest" is the share of rows in which the joint does not move, "at limit" the share
+In the table, "at rest" is the share of rows in which the joint does not move, "at limit" the share
 of rows at the extreme torque, "dq/q'" the ratio of recorded velocity to differentiated position,
 which is 1 in a consistent log, and "delay" that of the torque.
 """
@@ -43,14 +47,21 @@ def run(options: argparse.Namespace) -> None:
         if not options.json:  # the notes are printed above the checks
             warnings.simplefilter("ignore", LogWarning)
         frame = read_frame(options, robot, check=False)
-    with working("Checking", options):
-        quality = check_log(frame, robot)
+    with ExitStack() as checking:
+
+        def show(measured: LogQuality) -> None:
+            if not options.json:
+                for note in frame.attrs["notes"]:
+                    print(f"note: {note}")
+                print(measured.table, flush=True)
+            checking.enter_context(working("Checking", options))
+
+        quality = check_log(frame, robot, measured=show)
     if options.json:
         print_json(quality.to_dict())
     else:
-        for note in frame.attrs["notes"]:
-            print(f"note: {note}")
-        print(quality)
+        if quality.problems:
+            print(f"\n{quality.problems}")
         remedies = [c.remedy.option for c in quality.checks if c.remedy and c.certainty != "noted"]
         if remedies:
             print("\nto fix all of these problems and check again:")

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -153,6 +154,11 @@ class LogQuality:
         return content
 
     def __str__(self) -> str:
+        return "\n\n".join(part for part in (self.table, self.problems) if part)
+
+    @property
+    def table(self) -> str:
+        """The numbers of the log and of each joint."""
         lines = [
             f"{self.n_samples} samples in {self.n_trajectories} "
             f"{'trajectory' if self.n_trajectories == 1 else 'trajectories'}, "
@@ -167,18 +173,23 @@ class LogQuality:
         lines += [f"{joint.name:{width}s}{_motion_cells(joint)}" for joint in self.joints]
         lines += ["", f"{'joint':{width}s}{_TORQUE_HEAD}"]
         lines += [f"{joint.name:{width}s}{_torque_cells(joint)}" for joint in self.joints]
-        lines += ["", *self.notes]
-        return "\n".join([*self._told(), *lines]).rstrip()
+        return "\n".join(lines)
 
-    def _told(self) -> list[str]:
-        """Faults and suspicions, one paragraph each."""
+    @property
+    def problems(self) -> str:
+        """Faults, suspicions and limitations, one paragraph each; empty if there are none."""
         from skidyn.measurement import paragraphs
 
-        lines = [*(f"! {fault}" for fault in self.faults), *paragraphs(self.checks)]
-        return [*lines, ""] if lines else []
+        faults = (f"! {fault}" for fault in self.faults)
+        return "\n".join([*faults, *paragraphs(self.checks), *self.notes])
 
 
-def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
+def check_log(
+    frame: pd.DataFrame,
+    robot: Robot | None = None,
+    *,
+    measured: Callable[[LogQuality], object] | None = None,
+) -> LogQuality:
     """Check the quality of a log.
 
     Parameters
@@ -189,6 +200,9 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     robot : Robot, optional
         For its limits (coverage, units) and its dynamics: signs, order, gravity, scale and delay of
         the recording are tested by fitting the robot to it.
+    measured : callable, optional
+        Called with the report without ``checks`` as soon as its numbers are known: the checks take
+        most of the time.
 
     Returns
     -------
@@ -212,12 +226,7 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
     from skidyn.measurement import check_measurement  # also imports the fits
 
     measurement, n_trajectories, messages = _measured(frame, robot)
-    checks = check_measurement(measurement)
-    if robot is not None:
-        checks = by_influence(
-            frame, robot, checks, lambda log, own: _measured(log, own)[0], measurement.robot
-        )
-    return LogQuality(
+    quality = LogQuality(
         n_samples=measurement.n_samples,
         n_trajectories=n_trajectories,
         duration=float(measurement.steps.sum() - measurement.gaps.sum()),
@@ -227,10 +236,17 @@ def check_log(frame: pd.DataFrame, robot: Robot | None = None) -> LogQuality:
         largest_gap=float(measurement.steps.max()),
         repeated_rows=measurement.repeated,
         joints=tuple(_joints(measurement)),
-        checks=tuple(checks),
         faults=tuple(messages),
         notes=(_SINGLE,) if n_trajectories == 1 else (),
     )
+    if measured is not None:
+        measured(quality)
+    checks = check_measurement(measurement)
+    if robot is not None:
+        checks = by_influence(
+            frame, robot, checks, lambda log, own: _measured(log, own)[0], measurement.robot
+        )
+    return replace(quality, checks=tuple(checks))
 
 
 def _measured(frame: pd.DataFrame, robot: Robot | None) -> tuple[Measurement, int, list[str]]:

@@ -31,10 +31,11 @@ def flipped(tmp_path):
     return str(path)
 
 
-def test_check_says_first_what_matters_with_the_command_that_fixes_it(flipped, capsys):
+def test_check_says_what_matters_below_the_table_with_the_command_that_fixes_it(flipped, capsys):
     assert main(["check", flipped]) == 0
-    told = capsys.readouterr().out
-    assert told.startswith("!! the velocity of") and "--flip dq2" in told
+    table, told = capsys.readouterr().out.split("\n\n!! ")
+    assert table.startswith(f"{len(LOG)} samples")
+    assert told.startswith("the velocity of") and "--flip dq2" in told
     assert f"skidyn check {flipped} --flip dq2" in told
     assert main(["check", flipped, "--flip", "dq2", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["checks"] == []

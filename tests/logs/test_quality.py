@@ -143,3 +143,11 @@ def test_currents_passed_as_torques_are_suspected():
     log[torques] /= 9.0
     told = [text for text in check_log(log, panda).warnings if "motor currents" in text]
     assert len(told) == 1 and "panda_joint2 0.1" in told[0]
+
+
+def test_the_numbers_of_a_log_are_known_before_its_checks():
+    seen = []
+    quality = check_log(PLAIN.assign(dq2=-PLAIN["dq2"]), PLANAR, measured=seen.append)
+    (first,) = seen
+    assert first.joints == quality.joints and not first.checks and quality.checks
+    assert str(quality) == f"{first.table}\n\n{quality.problems}"
