@@ -37,8 +37,11 @@ FEWEST, LEAST_PART = 3, 2
 SHAPES = 3
 #: Largest share of what the part explains that the same effect in all recordings may explain.
 MOST_IN_ALL = 0.8
-#: Share of the largest drop from which a shape is refined together with its part.
-NEAR = 0.5
+#: Share of the largest drop from which a shape is refined together with its part, and share of what
+#: an effect explains in its best part from which it acts in the part of another joint.
+NEAR, SAME_PART = 0.5, 0.9
+#: Parts whose squared error, in units of the noise, differs by less are equally good.
+EQUAL = 1.0
 #: A recording whose information about an effect is a smaller share of the largest has no estimate.
 BLIND = 1e-3
 #: Approximate number of products of columns that are computed at a time.
@@ -150,7 +153,7 @@ def best_parts(
 ) -> list[Part | None]:
     """The best part of the recordings for each of some effects with as many columns.
 
-    It is None if the effect in all of them explains as much.
+    Of parts that are equally good it is the smallest. It is None if the effect in all of them explains as much.
 
     Parameters
     ----------
@@ -192,7 +195,9 @@ def best_parts(
     possible = (sizes >= LEAST_PART) & (sizes < seen.sum(1, keepdims=True))
     drops = np.where(possible[:, None], drops, -np.inf).reshape(count, 2 * n)
     found: list[Part | None] = []
-    for e, best in enumerate(drops.argmax(axis=1)):
+    # where the model follows the effect in all recordings, the others are as good a part
+    equal = drops >= drops.max(axis=1, keepdims=True) - EQUAL
+    for e, best in enumerate(np.where(equal, np.tile(sizes, 2), 2 * n).argmin(axis=1)):
         drop, (way, m) = float(drops[e, best]), divmod(int(best), n)
         recordings = tuple(sorted(names[orders[e, way, : m + 1]].tolist()))
         own_part = np.isfinite(drop) and in_all[e] < MOST_IN_ALL * drop
@@ -297,7 +302,7 @@ def part_candidates(
         settled = _settled(scan, refined, part, inside) if near else (part.drop, inside)
         found[form].append(settled)
     best_first = sorted(found.values(), key=lambda of_form: -max(drop for drop, _ in of_form))
-    return [_same_part(of_form) for of_form in best_first]
+    return [_same_part(tester, of_form) for of_form in best_first]
 
 
 def _settled(
@@ -324,18 +329,39 @@ def _settled(
     return part.drop, inside
 
 
-def _same_part(found: list[tuple[float, Candidate]]) -> list[Candidate]:
-    """The best candidate of a kind, and those of other joints that act in the same recordings."""
+def _same_part(tester: Tester, found: list[tuple[float, Candidate]]) -> list[Candidate]:
+    """The best candidate of a kind, and those of other joints that act in the same recordings.
+
+    Where the model follows an effect of all recordings, such as an offset, the other recordings
+    with the opposite sign are as good a part on each joint: one part of several joints decides.
+    """
     found = sorted(found, key=lambda item: -item[0])
-    best = found[0][1]
-    taken, own = set(best.joints), [best]
-    for _, candidate in found[1:]:
-        if candidate.term.trajectories == best.term.trajectories and taken.isdisjoint(
-            candidate.joints
-        ):
-            own.append(candidate)
-            taken |= set(candidate.joints)
-    return own
+    most, best = -np.inf, [found[0][1]]
+    for part in dict.fromkeys(c.term.trajectories or () for _, c in found):
+        total, taken, own = 0.0, set[int](), list[Candidate]()
+        for drop, candidate in found:
+            if taken.isdisjoint(candidate.joints):
+                there, inside = _in_part(tester, drop, candidate, part)
+                if there > SAME_PART * drop:
+                    total += there
+                    own.append(inside)
+                    taken |= set(inside.joints)
+        if total > most:
+            most, best = total, own
+    return best
+
+
+def _in_part(
+    tester: Tester, drop: float, candidate: Candidate, part: tuple[int, ...]
+) -> tuple[float, Candidate]:
+    """What a candidate removes in another part of the recordings, and the candidate there."""
+    if candidate.term.trajectories == part:
+        return drop, candidate
+    everywhere = candidate.term.everywhere
+    rows = tester.problem.term_rows(everywhere)
+    inside = within(tester.problem, replace(candidate, term=everywhere, rows=rows), part)
+    price = price_of_part(len(tester.problem.rows.recordings), len(part))
+    return tester.test(inside.rows).drop - price, inside
 
 
 def within(problem: Problem, candidate: Candidate, recordings: tuple[int, ...]) -> Candidate:

@@ -80,7 +80,7 @@ class Stribeck(Effect):
     coefficients = (Coefficient("dF", "N m", sign=1),)
     shapes = (
         Shape("vs", "rad/s", (0.03, 0.05, 0.075, 0.11, 0.16, 0.25), 0.01, 1.0),
-        Shape("delta", "1", (2.0,), 0.4, 2.6, scales=False),
+        Shape("delta", "1", (2.0,), 0.4, 4.0, scales=False),
     )
     forms = ({"lorentzian": 1.0},)
     simplicity = 8

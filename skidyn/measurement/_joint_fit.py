@@ -66,6 +66,18 @@ class JointFit:
         other.changed = list(changed)
         return other
 
+    def with_columns(self, columns: Array) -> JointFit:
+        """The same fit with further columns of each joint, shape (n_rows, n_fitted_joints, n)."""
+        other, n = copy(self), columns.shape[2]
+        first = 1 + max(int(place.max()) for place in self.places)
+        other.designs, other.places = [], []
+        for j, (design, place, use) in enumerate(
+            zip(self.designs, self.places, self.rows, strict=True)
+        ):
+            other.designs.append(np.hstack([design, columns[use, j]]))
+            other.places.append(np.concatenate([place, first + n * j + np.arange(n)]))
+        return other
+
     def moved(self, signals: Signals) -> JointFit:
         """The same coefficients for another motion, whose residual :meth:`left` gives."""
         other = copy(self)

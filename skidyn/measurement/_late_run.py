@@ -7,6 +7,7 @@ torques with the lag, in the rows of one recording, is a column of the fit of al
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,3 +69,27 @@ def find_late_run(score: Score) -> LateRun | None:
 
     lag = likeliest_lag(of_run, promised[run][1])
     return LateRun(run, lag, of_run(lag), of_torque(lag))
+
+
+def is_of_friction(score: Score, lags: Mapping[int, float]) -> bool:
+    """Whether friction of another size in some recordings explains more than lags of their torques.
+
+    A cold gear has more friction in the first recording, which a lag of this recording partly
+    imitates, since velocity is early relative to gravity and late relative to inertia.
+
+    Parameters
+    ----------
+    score : Score
+        Fit of all joints.
+    lags : dict of int to float, s
+        Lags of the torque by recording.
+    """
+    fits = score.fits
+    dq, lag = fits.signals.dq[:, score.joints], np.zeros(len(fits.signals.dq))
+    sizes = []
+    for run, of_run in lags.items():
+        there = fits.recording == run
+        lag[np.repeat(there, SAMPLES)] = of_run
+        sizes += [fits.average(values) * there[:, None] for values in (dq, np.sign(dq))]
+    with_friction = score.together.with_columns(np.stack(sizes, axis=2)).fit(fits.torque)
+    return score.gain(with_friction) > score.gain_of_torque(range(fits.n_joints))(lag)

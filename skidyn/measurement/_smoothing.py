@@ -5,7 +5,8 @@ Dry friction changes its sign when a joint reverses. Presliding comes after the 
 distance; a low pass without delay spreads the step over the same time before and after, equally in
 all joints. Without this check it would be reported as presliding friction. Friction that depends on
 the speed, which falls or rises as the joint comes to rest, changes before the reversal as well, but
-with the speed and not with time: it is fitted, too.
+with the speed and not with time: it is fitted, too. A torque that contains the fast noise of its
+sensor was not smoothed over a longer time.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from skidyn.effects import get_effect
 from skidyn.evidence import column_step
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
+from skidyn.measurement._measures import channel_step
 from skidyn.measurement._robust import student
 from skidyn.measurement._rows import running_mean, smoothed
 from skidyn.measurement._suspicion import Suspicion
@@ -47,6 +49,10 @@ FAST = 0.03
 WORD, LEAST, AGREEING, JOINTS, SHORTEST = 2.0, 15.0, 0.6, 2, 0.05
 #: Delay of the torque, s, that smoothing does not make.
 LATE = 0.012
+#: Samples of a spectrum, lower ends of its bands at half of the highest frequency and below it, as
+#: shares of the sampling rate; the ratio of their powers from which noise was not filtered, and its
+#: variance, in units of that of rounding, from which it is not rounding.
+WINDOW, BANDS, EVEN, ROUNDED = 64, (0.2, 0.4), 0.75, 4.0
 
 
 @dataclass(frozen=True)
@@ -106,7 +112,7 @@ class SmoothedTorque(Check):
         step = column_step(motion, AROUND, motion.half_width)
         index, few = motion.thinned(step)
         torque = running_mean(measurement.torque, step)[index]
-        joints = np.flatnonzero(measurement.excited).tolist()
+        joints = [k for k in np.flatnonzero(measurement.excited) if not _is_noisy(measurement, k)]
         fewest = min(JOINTS, measurement.n_joints)
         tried = [at_turns(few, torque[:, k], k, others=False) for k in joints]
         # beside other friction, smoothing gains less
@@ -134,6 +140,31 @@ class SmoothedTorque(Check):
             "suspected",
             alike,
         )
+
+
+def _is_noisy(measurement: Measurement, joint: int) -> bool:
+    """Whether the torque of a joint contains the fast noise of its sensor.
+
+    Noise is as strong near the highest frequency as at half of it. What a filter left decreases,
+    that of a running mean to a half. The rounding of a coarse sensor may come after its filter and
+    does not count.
+    """
+    torque = measurement.torque[:, joint]
+    powers = []
+    for rows in measurement.signals.segments:
+        count = (rows.stop - rows.start) // WINDOW
+        if count:
+            parts = torque[rows][: count * WINDOW].reshape(count, WINDOW)
+            parts = (parts - parts.mean(axis=1, keepdims=True)) * np.hanning(WINDOW)
+            powers.append(np.abs(np.fft.rfft(parts, axis=1)) ** 2)
+    if not powers:
+        return False
+    # jumps are as strong at half of it as what a running mean leaves: most windows have none
+    power = np.median(np.concatenate(powers), axis=0) / np.sum(np.hanning(WINDOW) ** 2)
+    half, highest = (float(power[int(share * WINDOW) :][: WINDOW // 10].mean()) for share in BANDS)
+    coarse = channel_step(torque)
+    rounding = 0.0 if np.isnan(coarse) else coarse**2 / 12.0
+    return highest > max(EVEN * half, ROUNDED * rounding)
 
 
 def at_turns(signals: Signals, torque: Array, joint: int, *, others: bool = True) -> Turns | None:

@@ -15,7 +15,7 @@ from skidyn.measurement._fits import Fits
 from skidyn.measurement._joint_fit import lag_gain, refined_lag
 from skidyn.measurement._lags_of_recordings import LagsOfRecordings, lags_of_recordings
 from skidyn.measurement._late_motion import LateMotion, find_late_motion
-from skidyn.measurement._late_run import LateRun, find_late_run
+from skidyn.measurement._late_run import LateRun, find_late_run, is_of_friction
 from skidyn.measurement._lowpass import lowpass_of_torque, suspect_lowpass
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import is_short
@@ -88,13 +88,15 @@ class TorqueDelay(Check):
             yield self._drifting(found, drift if known and _is_sure(drift) else None)
             return
         apart = lags_of_recordings(measurement)
-        if apart is not None:
+        score = Score(fits)
+        if apart is not None and not is_of_friction(score, apart.lags):
             yield from self._of_runs(apart)
             return
         odd = late_runs(found)
         most = max((one.gain for one in odd.values()), default=0.0)
         if most < found.gains[late_joints(found)].sum():
             odd = {}  # one joint is late in all of them, and felt more in some
+        odd = {k: one for k, one in odd.items() if not is_of_friction(score, {k: one.lag})}
         for run, one in odd.items():
             gained = f"{one.gain:.0f} (log-likelihood), {one.agreeing:.0%} of which is on joints"
             yield self._late_run(run, one.lag, f"{gained} that agree")
@@ -110,7 +112,6 @@ class TorqueDelay(Check):
         early = measurement.late_position
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
             return
-        score = Score(fits)
         late_run = None if measurement.dead else find_late_run(score)
         if late_run is not None and _is_late(late_run):
             gained = f"{late_run.gain:.0f} (log-likelihood)"

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from skidyn.datasets import load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 
 
@@ -24,3 +25,15 @@ def test_one_recording_is_late_beside_a_load(loaded):
 
 def test_a_load_is_no_lag(loaded):
     assert "torque_delay" not in {s.check for s in loaded.checks}
+
+
+def test_friction_of_a_cold_start_is_no_lag():
+    log = make_hidden_effect_log(
+        load_ur5(), None, n_trajectories=5, duration=6.0, random_state=2
+    )
+    frame = log.frame.copy()
+    first = frame["trajectory"] == frame["trajectory"].iloc[0]
+    for k in range(1, 7):
+        friction = 0.5 * frame[f"tau{k}"].std() * np.tanh(frame.loc[first, f"dq{k}"] / 0.02)
+        frame.loc[first, f"tau{k}"] += friction
+    assert "torque_delay" not in {s.check for s in check_log(frame, log.robot).checks}

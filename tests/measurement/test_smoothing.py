@@ -52,3 +52,14 @@ def test_too_few_turns_to_tell():
     frame = made(None).iloc[: len(t)]
     resting = frame.assign(**{f"dq{k + 1}": 0.0 for k in range(6)})
     assert "smoothed_torque" not in told_of(resting)
+
+
+def test_a_torque_with_fast_noise_was_not_smoothed():
+    frame = made(None)
+    noise = np.random.default_rng(0).normal(size=(len(frame), 6))
+    for rows in frame.groupby("trajectory").groups.values():
+        for name in TORQUES:
+            values = uniform_filter1d(frame.loc[rows, name].to_numpy(), 21, mode="nearest")
+            frame.loc[rows, name] = values
+    frame[TORQUES] += 0.02 * frame[TORQUES].std().to_numpy() * noise
+    assert "smoothed_torque" not in told_of(frame)
