@@ -223,6 +223,15 @@ class Signals:
         return np.arange(self.n_samples, dtype=float) if self.time is None else self.time
 
     @cached_property
+    def since_start(self) -> Array:
+        """Time since the first sample of the trajectory, s."""
+        since = np.zeros(self.n_samples)
+        for name in np.unique(self.trajectory):
+            here = self.trajectory == name
+            since[here] = self.clock[here] - self.clock[here].min()
+        return since
+
+    @cached_property
     def rate(self) -> float:
         """Median sampling rate, Hz; 1 if no time is logged."""
         steps = np.diff(self.clock)[self.within]

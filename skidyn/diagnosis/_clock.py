@@ -1,13 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A torque periodic in time: the strongest line of the residual's spectrum over time."""
+"""A torque periodic in time: the strongest line of the residual's spectrum over time.
+
+A wave that is faster than the motion is a line in the sum of the spectra of the segments, whatever
+its phase is in each of them. A slower one, which may be multiplied by a signal, is found with a
+common phase in all segments, by the time of the log or since the start of each recording.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
+from scipy.optimize import minimize_scalar
 from scipy.stats import gamma
 
 from skidyn._signals import Array, Signals
@@ -18,6 +25,9 @@ LOWEST, HIGHEST = 0.3, 0.45
 NEIGHBOURS, SHORTEST = 201, 32
 #: Chance of a line, over all frequencies, below which it is tested.
 WORTH = 0.01
+#: Rows per second in which a slow wave is searched, frequencies of the spectrum per resolved one,
+#: and width, Hz, of the band around a line whose median is its noise.
+SLOW_RATE, FINER, AROUND = 40.0, 4, 2.0
 #: Samples used for the coherent refinement, which thins the log no further than the line allows.
 COHERENT = 4000
 
@@ -117,3 +127,90 @@ def _refined(signals: Signals, clean: Array, centre: float, span: float) -> floa
         strength[k] = np.abs(slow.sum())
         slow *= turn
     return centre - reach + step * int(np.argmax(strength))
+
+
+def slow_lines(
+    signals: Signals,
+    residual: Array,
+    carriers: Sequence[Array],
+    use: NDArray[np.bool_],
+    band: tuple[float, float],
+) -> list[dict[str, float]]:
+    """Shapes of the strongest waves that, multiplied by some signals, explain a residual.
+
+    Parameters
+    ----------
+    signals : Signals
+        Motion.
+    residual : ndarray of shape (n_samples,), N m or N
+        Residual of one joint.
+    carriers : sequence of ndarray of shape (n_samples,)
+        Signals by which the wave is multiplied; each has an amplitude and a phase of its own.
+    use : ndarray of shape (n_samples,) of bool
+        Samples that are used.
+    band : (float, float), Hz
+        Lowest and highest frequency.
+
+    Returns
+    -------
+    list of dict
+        ``frequency``, Hz, and ``since_start`` if the phase begins anew with every recording; empty
+        if no wave stands out of its neighbours.
+    """
+    found = []
+    for time, shape in ((signals.clock, {}), (signals.since_start, {"since_start": 1.0})):
+        frequency = _slow_line(time, residual, carriers, use, band)
+        if frequency is not None:
+            found.append({"frequency": frequency, **shape})
+    return found
+
+
+def _slow_line(
+    time: Array,
+    residual: Array,
+    carriers: Sequence[Array],
+    use: NDArray[np.bool_],
+    band: tuple[float, float],
+) -> float | None:
+    own = np.column_stack([carrier[use] for carrier in carriers])
+    own = own / np.maximum(np.sqrt(np.mean(own**2, axis=0)), np.finfo(float).tiny)
+    place = ((time[use] - time[use].min()) * SLOW_RATE).astype(np.int64)
+    count = int(place.max()) + 1
+    points = 2 ** int(np.ceil(np.log2(FINER * count)))
+    frequency = np.fft.rfftfreq(points, 1 / SLOW_RATE)
+    inside = (frequency > band[0]) & (frequency < band[1])
+    weighted = own * residual[use][:, None]
+    waves = np.array([np.fft.rfft(np.bincount(place, w, count), points) for w in weighted.T])
+    inverse = np.linalg.pinv(own.T @ own)
+    power = np.real(np.einsum("kf,kl,lf->f", waves.conj(), inverse, waves))[inside]
+    k = len(carriers)
+    width = max(3, int(AROUND / frequency[1]) | 1)
+    sparse = max(1, width // NEIGHBOURS)  # the median of the largest of some has the same shape
+    level = np.interp(
+        frequency[inside],
+        frequency[inside][::sparse],
+        median_filter(power[::sparse], max(3, width // sparse | 1)),
+    )
+    ratio = power / np.maximum(level, np.finfo(float).tiny) * gamma.median(k)
+    best = int(np.argmax(power))
+    chance = float(gamma.sf(ratio[best], k)) * int(inside.sum()) / FINER
+    if chance > WORTH or not 0 < best < len(power) - 1:
+        return None
+    # Motion is not orthogonal to a wave of few periods, so that its line is shifted.
+    held = np.flatnonzero(np.bincount(place))
+    mean = np.bincount(place)[held]
+    at = np.bincount(place, time[use])[held] / mean
+    y, *columns = (np.bincount(place, v)[held] / mean for v in (residual[use], *own.T))
+
+    def left(tried: float) -> float:
+        waves = np.exp(2j * np.pi * tried * at)
+        parts = [c * part for c in columns for part in (waves.real, waves.imag)]
+        block = np.column_stack([*parts, *columns, np.ones_like(y)])
+        rest = y - block @ np.linalg.lstsq(block.T @ block, block.T @ y, rcond=1e-12)[0]
+        return float(rest @ rest)
+
+    middle, reach = float(frequency[inside][best]), FINER * float(frequency[1])
+    steps = middle + np.linspace(-reach, reach, 4 * FINER + 1)
+    k = int(np.argmin([left(tried) for tried in steps]))
+    bounds = (steps[max(0, k - 1)], steps[min(len(steps) - 1, k + 1)])
+    return float(minimize_scalar(left, bounds=bounds, method="bounded").x)

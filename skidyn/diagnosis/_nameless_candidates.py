@@ -8,7 +8,7 @@ from collections.abc import Collection
 from skidyn._cores import each
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
-from skidyn.diagnosis._clock import LOWEST, clock_line
+from skidyn.diagnosis._clock import LOWEST, slow_lines
 from skidyn.diagnosis._followed_signals import Followed, followed_signals
 from skidyn.diagnosis._hypothesis import UNKNOWN
 from skidyn.diagnosis._spectrum import SLOWEST
@@ -75,14 +75,13 @@ def nameless_candidates(
             if isinstance(effect, FunctionOfSum):
                 shapes = [effect.shape_of(few, *of) for of in followed[joint].sums]
             if isinstance(effect, ClockPeriodic):
-                line = clock_line(
+                shapes = slow_lines(
                     problem.signals,
-                    residual[:, joint] * effect.carriers(problem.signals, joint)[-1],
+                    residual[:, joint],
+                    effect.carriers(problem.signals, joint),
                     problem.rows.sliding[:, joint],
-                    problem.signals.rate,
                     (LOWEST, SLOWEST),
                 )
-                shapes = [] if line is None else [{"frequency": line.frequency}]
             for shape in shapes:
                 made.append((Term.at(kind, joints, shape), effect.variables(joint, shape)))
     all_rows = problem.prepare([term for term, _ in made], screening=True)

@@ -48,10 +48,10 @@ class FunctionOfTimeSinceStart(NamelessEffect):
     needs = ("time",)
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        return [{"length": float(np.max(_since_start(signals)))}]
+        return [{"length": float(np.max(signals.since_start))}]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        share = _since_start(signals) / max(shape["length"], 1e-9)
+        share = signals.since_start / max(shape["length"], 1e-9)
         fading = [np.exp(-share / s) for s in _FADING]
         return np.column_stack([*fading, share, np.ones_like(share)])
 
@@ -72,7 +72,7 @@ class OscillationSinceStart(NamelessEffect):
     needs = ("time",)
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        since = _since_start(signals)
+        since = signals.since_start
         phase = 2 * np.pi * shape["frequency"] * since
         fading = np.exp(-since / shape["decay"])
         return np.column_stack([fading * np.cos(phase), fading * np.sin(phase)])
@@ -375,15 +375,6 @@ def _last_reversal(signals: Signals, joint: int) -> Array:
     way = strokes.direction[strokes.stroke] * strokes.way
     turned[strokes.rows] = signals.q[strokes.rows, joint] - way
     return turned
-
-
-def _since_start(signals: Signals) -> Array:
-    """Time since the first sample of the trajectory, in s."""
-    since = np.zeros(signals.n_samples)
-    for name in np.unique(signals.trajectory):
-        here = signals.trajectory == name
-        since[here] = signals.clock[here] - signals.clock[here].min()
-    return since
 
 
 HISTORY: tuple[type[NamelessEffect], ...] = (

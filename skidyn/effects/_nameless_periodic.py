@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,7 +13,10 @@ from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
 
 
 class ClockPeriodic(NamelessEffect):
-    """A torque periodic in time, of any wave form: a pump, a cam, a cyclic controller."""
+    """A torque periodic in time, of any wave form: a pump, a cam, a cyclic controller.
+
+    With ``since_start`` in its shape, its phase begins anew with every recording.
+    """
 
     kind = "clock_periodic"
     drawn_against = "time"
@@ -28,14 +32,16 @@ class ClockPeriodic(NamelessEffect):
     highest: ClassVar[float] = 8.0
 
     def carriers(self, signals: Signals, joint: int) -> list[Array]:
-        """What the waves are multiplied by, each of shape (n_samples,).
-
-        The line is searched in the residual times the last one.
-        """
+        """What the waves are multiplied by, each of shape (n_samples,)."""
         return [np.ones(signals.n_samples)]
 
+    def words(self, shape: Mapping[str, Any]) -> str:
+        since = " since the start of each recording" if "since_start" in shape else ""
+        return f"{self.title}{since}"
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        phase = 2 * np.pi * shape["frequency"] * signals.clock
+        time = signals.since_start if "since_start" in shape else signals.clock
+        phase = 2 * np.pi * shape["frequency"] * time
         shown = [float(h * shape["frequency"] <= self.highest) for h in self.harmonics]
         waves = [
             s * wave(h * phase)
@@ -58,6 +64,22 @@ class PulsatingFriction(ClockPeriodic):
 
     def carriers(self, signals: Signals, joint: int) -> list[Array]:
         return [signals.sign[:, joint]]
+
+
+class PulsatingDrag(ClockPeriodic):
+    """Friction proportional to the speed that is periodic in time, as of a stirred bath."""
+
+    kind = "pulsating_drag"
+    drawn_against = "dq"
+    title = "Viscous friction periodic in time"
+    formula = r"\dot q_j\sum_h a_h\sin(2\pi h f t) + b_h\cos(2\pi h f t)"
+    coefficients = unnamed_coefficients(4)
+    depends_on = ("dq_own", "time")
+    is_of_one_number = True
+    harmonics = (1, 2)
+
+    def carriers(self, signals: Signals, joint: int) -> list[Array]:
+        return [signals.dq[:, joint] / signals.unit[joint]]
 
 
 class PulsatingSpring(ClockPeriodic):
@@ -97,6 +119,7 @@ class Vibration(NamelessEffect):
 PERIODIC: tuple[type[NamelessEffect], ...] = (
     ClockPeriodic,
     PulsatingFriction,
+    PulsatingDrag,
     PulsatingSpring,
     Vibration,
 )

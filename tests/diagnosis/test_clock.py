@@ -57,3 +57,15 @@ def test_a_wave_is_told_in_samples_that_really_were_uneven():
 
     assert diagnosis.findings[0].variables == ("time",)
     np.testing.assert_allclose(diagnosis.findings[0].terms[0].shape["frequency"], 21.7, atol=0.02)
+
+
+@pytest.mark.parametrize("signal", ["q2", "dq2"])
+def test_a_wave_that_begins_with_every_recording_is_told_with_its_signal(log, signal):
+    X, torque = log.X, np.array(log.y)
+    since = X["time"] - X.groupby("trajectory")["time"].transform("min")
+    torque[:, 1] += 5 * log.noise_std[1] * X[signal] * np.sin(2 * np.pi * 0.73 * since + 0.4)
+
+    (first,) = diagnose(RBDRegressor(log.robot), X, torque).findings
+
+    assert (first.joints, set(first.variables)) == ((2,), {signal, "time"})
+    np.testing.assert_allclose(first.terms[0].shape["frequency"], 0.73, atol=0.01)
