@@ -223,7 +223,8 @@ def simplicity_of(hypothesis: Hypothesis) -> int:
     """Rank of its kind among equally good rivals; the lowest is preferred."""
     if hypothesis.kind == UNKNOWN:
         return 100
-    return get_effect(hypothesis.kind).simplicity + 50 * hypothesis.is_further_form
+    ranks = [c.term.effect.simplicity_of(c.term.shape) for c in hypothesis.candidates]
+    return max(ranks) + 50 * hypothesis.is_further_form
 
 
 def uses_the_fit(candidate: Candidate) -> bool:

@@ -284,7 +284,11 @@ class RankingSearch(SearchState):
 
         tester, least = self.tester(self.chosen), self.settings.least_gain
         pool = [c for c in self.pool if c.term.effect.comes_and_goes and not some_recordings(c)]
-        pool += own_friction(self.problem, self.kinds)
+        # where friction has changed already, it has changed again
+        changed = {c.joints for c in self.chosen if c.kind == DRIFT and some_recordings(c)}
+        friction = own_friction(self.problem, self.kinds)
+        pool = [c for c in pool if c.kind not in FRICTION or c.joints not in changed]
+        pool += [c for c in friction if c.kind == DRIFT or c.joints not in changed]
         found = part_candidates(pool, tester, self.significant, refined, least)
         return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
 

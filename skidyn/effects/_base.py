@@ -221,6 +221,21 @@ class Effect:
         """
         return []
 
+    def simplicity_of(self, shape: Mapping[str, Any]) -> int:
+        """Rank among rivals that explain the data equally well, for a given shape.
+
+        Parameters
+        ----------
+        shape : mapping
+            Shape parameters.
+
+        Returns
+        -------
+        int
+            :attr:`simplicity` by default; the lowest is preferred.
+        """
+        return self.simplicity
+
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
         """Linear coefficients for a given shape, one per column.
 

@@ -162,6 +162,11 @@ class FrictionDrift(Effect):
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         return "since" not in shape or _lasts(signals, shape["since"])
 
+    def simplicity_of(self, shape: Mapping[str, Any]) -> int:
+        # Another level of the friction that the model has: no other formula in some recordings is
+        # simpler.
+        return 0 if "level" in shape else self.simplicity
+
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
         at_once = {"since", "level"} & set(shape)
         return self.coefficients[:2] if at_once else self.coefficients
