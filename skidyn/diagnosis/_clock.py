@@ -28,6 +28,8 @@ WORTH = 0.01
 #: Rows per second in which a slow wave is searched, frequencies of the spectrum per resolved one,
 #: and width, Hz, of the band around a line whose median is its noise.
 SLOW_RATE, FINER, AROUND = 40.0, 4, 2.0
+#: Share of a wave from which motion contains it.
+CONTAINED = 0.5
 #: Samples used for the coherent refinement, which thins the log no further than the line allows.
 COHERENT = 4000
 
@@ -155,14 +157,27 @@ def slow_lines(
     -------
     list of dict
         ``frequency``, Hz, and ``since_start`` if the phase begins anew with every recording; empty
-        if no wave stands out of its neighbours.
+        if no wave stands out of its neighbours. A wave that the motion contains, as if every
+        recording repeats one periodic motion, is left out: a function of the motion is not
+        separable from it.
     """
     found = []
     for time, shape in ((signals.clock, {}), (signals.since_start, {"since_start": 1.0})):
         frequency = _slow_line(time, residual, carriers, use, band)
-        if frequency is not None:
+        if frequency is not None and not _in_motion(signals, time, frequency):
             found.append({"frequency": frequency, **shape})
     return found
+
+
+def _in_motion(signals: Signals, time: Array, frequency: float) -> bool:
+    """Whether positions, velocities and accelerations of all joints contain a wave in time."""
+    some = slice(None, None, max(1, len(time) // COHERENT))
+    motion = [signals.q, signals.dq, signals.ddq, np.ones((len(time), 1))]
+    block = np.hstack([part[some] for part in motion])
+    wave = np.exp(2j * np.pi * frequency * time[some])
+    wave = np.column_stack([wave.real, wave.imag])
+    left = wave - block @ np.linalg.lstsq(block, wave, rcond=1e-9)[0]
+    return bool(np.sum(left**2) < (1 - CONTAINED) * np.sum(wave**2))
 
 
 def _slow_line(
