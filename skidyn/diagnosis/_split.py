@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, rows_within
+from skidyn.diagnosis._confidence import SEPARATES
 from skidyn.diagnosis._profile import QUARTERS
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Felt, Problem, column_sizes, felt_columns, left_out_errors
@@ -121,7 +122,10 @@ def _best_splits(
     for drops, is_apart in ((together, False), (apart, True)):
         if not drops:
             continue
-        drop, chosen = max(drops, key=lambda item: float(item[0].sum()))
+        most = max(float(drop.sum()) for drop, _ in drops)
+        # bodies may follow a force in all trajectories, so that its absence from some is equal
+        equal = [item for item in drops if float(item[0].sum()) > most - SEPARATES]
+        drop, chosen = min(equal, key=lambda item: (len(item[1]), -float(item[0].sum())))
         split = term.with_shape(trajectories=tuple(sorted(int(name) for name in chosen)))
         rows = rows_within(problem, problem.term_rows(term), chosen)
         found.append(Split(Candidate(term.kind, split, rows), drop, is_apart))
@@ -234,9 +238,11 @@ def _splits(grows: bool, own: Array, names: NDArray[Any]) -> list[list[Any]]:
     moved = away @ np.linalg.svd(away, full_matrices=False)[2][0]
     groups = _beyond_gaps(moved, names, sides=2)
     if not grows:
-        # A force acts in the smaller group; forces of several directions are all far from the rest.
+        # forces of several directions are all far from the rest
         far = _beyond_gaps(np.linalg.norm(away, axis=1), names, sides=1)
-        return groups + [group for group in far if len(group) <= len(names) / 2]
+        far = [group for group in far if len(group) <= len(names) / 2]
+        others = [[name for name in names.tolist() if name not in group] for group in groups]
+        return groups + far + others
     # A payload adds mass, possibly in most of the trajectories.
     mass = own[:, 0]
     lighter = [mass[inside].mean() < mass[~inside].mean() for inside in _members(groups, names)]
