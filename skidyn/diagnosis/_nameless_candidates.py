@@ -70,7 +70,7 @@ def nameless_candidates(
                 continue
             shapes = effect.grid(few, joints)
             if isinstance(effect, FunctionOfSignals):
-                sets = [names for names in followed[joint].sets if len(names) == effect.n_signals]
+                sets = [names for names in followed[joint].sets if effect.admits(names)]
                 shapes = [effect.shape_of(few, names) for names in sets]
             if isinstance(effect, FunctionOfSum):
                 shapes = [effect.shape_of(few, *of) for of in followed[joint].sums]

@@ -21,6 +21,8 @@ from skidyn.effects._smooth import (
     supported_ranges,
 )
 
+#: Highest degree of a product of functions of two signals.
+HIGHEST_OF_TWO = 5
 #: Difference between the ratios of torque and of distance above which a coupling is not elastic.
 _UNEQUAL = 0.2
 #: Number of pairs of joints, nearest first, between which a torque is tried.
@@ -57,6 +59,16 @@ class FunctionOfSignals(NamelessEffect):
             *(supported_range(signals, signals.named(name)) for name in names), strict=True
         )
         return {"of": tuple(names), "low": low, "high": high}
+
+    def admits(self, names: Sequence[str]) -> bool:
+        """Whether it can be a function of some signals.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Signals, joints counted from 1.
+        """
+        return len(names) == self.n_signals
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         n = len(self.coefficients)
@@ -110,6 +122,31 @@ class FunctionOfThreeSignals(FunctionOfSignals):
     formula = r"f(s_1, s_2, s_3)"
     coefficients = unnamed_coefficients(35)
     n_signals = 3
+
+
+class FrictionOverTwoSignals(FunctionOfSignals):
+    """Dry friction that depends on two other signals, as on the load in a configuration."""
+
+    kind = "friction_over_two_signals"
+    title = "Dry friction over two signals"
+    formula = r"\mathrm{sign}\,\dot q\,f(s_1, s_2)"
+    coefficients = unnamed_coefficients(21)
+    n_signals = 3
+
+    def admits(self, names: Sequence[str]) -> bool:
+        return super().admits(names) and sum(name.startswith("dq") for name in names) == 1
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        (speed,) = (name for name in shape["of"] if name.startswith("dq"))
+        ranges = zip(shape["of"], shape["low"], shape["high"], strict=True)
+        first, second = (
+            ordered_functions(signals.named(name), None, low, high)
+            for name, low, high in ranges
+            if name != speed
+        )
+        most = HIGHEST_OF_TWO + 1
+        products = [first[:, i] * second[:, k] for i in range(most) for k in range(most - i)]
+        return signals.sign[:, [int(speed[2:]) - 1]] * np.column_stack(products)
 
 
 class FunctionOfSum(NamelessEffect):
@@ -240,6 +277,7 @@ OF_SIGNALS: tuple[type[NamelessEffect], ...] = (
     FunctionOfTwoSignals,
     LowOrderOfTwoSignals,
     FunctionOfThreeSignals,
+    FrictionOverTwoSignals,
     FunctionOfSum,
     TorqueBetweenTwoJoints,
 )
