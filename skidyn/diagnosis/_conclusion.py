@@ -68,6 +68,7 @@ from skidyn.diagnosis._withdrawal import (
     useless,
     without,
 )
+from skidyn.diagnosis._wandering import find_wandering, wandering_torque
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 
@@ -180,6 +181,10 @@ def conclude(
     episodes, inside = find_episodes(problem, smooth, least, share_held)
     if episodes:
         findings.append(_episodic(episodes, inside, result.fit.residual))
+        taken.update(j - 1 for e in episodes for j in e.joints)
+    free = [j for j in np.flatnonzero(parts.material).tolist() if j not in taken]
+    if wandering := find_wandering(problem, result.fit.residual, free):
+        findings.append(wandering_torque(wandering))
     ends = np.array(history[0]["rmse"]), rmse
     whole = problem.whole_trajectories
     scores = {h.kind: h.score for h in result.findings}

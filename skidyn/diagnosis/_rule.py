@@ -156,6 +156,10 @@ EPISODE_SLIDING = 0.9
 #: A force at one link must explain this share of the squared torque of all joints.
 EPISODE_FORCE_SHARE = 0.8
 
+#: Share of a squared residual that its values at other times must predict to be called one of time
+#: (``_wandering.py``).
+WANDERS = 0.5
+
 # When a remainder is material (``_remainder.py``); ``real_recordings.py``, ``nothing_hidden.py``.
 #: Times the noise, and share of the torque's range, above which a remainder is material: smoothing
 #: and coloured noise leave up to 1.5 times the fast noise, and healthy robots some hundredths of
