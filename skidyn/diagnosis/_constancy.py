@@ -18,6 +18,8 @@ References
    Econometrica 28(3).
 .. [2] J. B. Ramsey (1969), Tests for specification errors in classical linear least-squares
    regression analysis, Journal of the Royal Statistical Society B 31(2).
+.. [3] G. E. Mizon, J.-F. Richard (1986), The encompassing principle and its application to testing
+   non-nested hypotheses, Econometrica 54(3).
 """
 
 from __future__ import annotations
@@ -101,7 +103,7 @@ def changes(problem: Problem, result: SearchResult) -> dict[str, Change]:
     for kind, of_kind in torques.items():
         without = beside(kind)
         explained[kind] = sum(without.test(blocks[term]).drop for term in of_kind)
-        other = _instead(bare, torques, kind, without, explained[kind])
+        other = _instead(bare, torques, kind, without, explained[kind], whole)
         if other is not None:
             # a formula does not leave more than it removes
             joints = {j for torque in of_kind.values() for j in torque}
@@ -129,8 +131,12 @@ def _instead(
     kind: str,
     without: Tester,
     explained: float,
+    whole: Tester,
 ) -> str | None:
-    """Kind of another effect on the same joints whose change explains most of what a kind does."""
+    """Kind of another effect on the same joints whose change explains most of what a kind does.
+
+    A change that explains nothing in addition to this kind only imitates it [3]_.
+    """
     joints = {j for torque in torques[kind].values() for j in torque}
     best, most = None, CHANGE_INSTEAD * explained
     for other, of_kind in torques.items():
@@ -139,7 +145,7 @@ def _instead(
         there = [torque for torque in of_kind.values() if joints & set(torque)]
         for block in (b for torque in there for b in _reshaped(problem, torque)):
             drop = without.test(block).drop
-            if drop > most:
+            if drop > most and whole.test(block).chance < CHANGE_LEVEL:
                 best, most = other, drop
     return best
 
