@@ -103,7 +103,8 @@ def changes(problem: Problem, result: SearchResult) -> dict[str, Change]:
     for kind, of_kind in torques.items():
         without = beside(kind)
         explained[kind] = sum(without.test(blocks[term]).drop for term in of_kind)
-        other = _instead(bare, torques, kind, without, explained[kind], whole)
+        of_blocks = [blocks[term] for term in of_kind]
+        other = _instead(bare, torques, kind, (without, whole), explained[kind], of_blocks)
         if other is not None:
             # a formula does not leave more than it removes
             joints = {j for torque in of_kind.values() for j in torque}
@@ -129,15 +130,17 @@ def _instead(
     problem: Problem,
     torques: dict[str, dict[Term, _Block]],
     kind: str,
-    without: Tester,
+    testers: tuple[Tester, Tester],
     explained: float,
-    whole: Tester,
+    own: Sequence[_Block],
 ) -> str | None:
     """Kind of another effect on the same joints whose change explains most of what a kind does.
 
-    A change that explains nothing in addition to this kind only imitates it [3]_.
+    A change that explains nothing in addition to this kind, though this kind explains more in
+    addition to the change, only imitates it [3]_.
     """
     joints = {j for torque in torques[kind].values() for j in torque}
+    without, whole = testers
     best, most = None, CHANGE_INSTEAD * explained
     for other, of_kind in torques.items():
         if other == kind:
@@ -145,9 +148,19 @@ def _instead(
         there = [torque for torque in of_kind.values() if joints & set(torque)]
         for block in (b for torque in there for b in _reshaped(problem, torque)):
             drop = without.test(block).drop
-            if drop > most and whole.test(block).chance < CHANGE_LEVEL:
+            if drop > most and not _imitates(block, own, without, whole):
                 best, most = other, drop
     return best
+
+
+def _imitates(
+    block: _Block, own: Sequence[_Block], without: Tester, whole: Tester
+) -> bool:
+    """Whether a change explains nothing beside an effect, which explains more beside the change."""
+    if whole.test(block).chance < CHANGE_LEVEL:
+        return False
+    beside = without.beside([block])
+    return any(beside.test(rows).chance < CHANGE_LEVEL for rows in own)
 
 
 def _variants(
