@@ -28,6 +28,8 @@ WORTH = 0.01
 #: Rows per second in which a slow wave is searched, frequencies of the spectrum per resolved one,
 #: and width, Hz, of the band around a line whose median is its noise.
 SLOW_RATE, FINER, AROUND = 40.0, 4, 2.0
+#: Longest time, s, over which a slow wave has a common phase.
+LONGEST = 6000.0
 #: Share of a wave from which motion contains it.
 CONTAINED = 0.5
 #: Samples used for the coherent refinement, which thins the log no further than the line allows.
@@ -187,6 +189,8 @@ def _slow_line(
     use: NDArray[np.bool_],
     band: tuple[float, float],
 ) -> float | None:
+    if use.sum() < SHORTEST or np.ptp(time[use]) > LONGEST:
+        return None
     own = np.column_stack([carrier[use] for carrier in carriers])
     own = own / np.maximum(np.sqrt(np.mean(own**2, axis=0)), np.finfo(float).tiny)
     place = ((time[use] - time[use].min()) * SLOW_RATE).astype(np.int64)
