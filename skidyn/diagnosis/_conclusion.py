@@ -59,6 +59,7 @@ from skidyn.diagnosis._rule import (
 )
 from skidyn.diagnosis._search_state import replace_torque
 from skidyn.diagnosis._unknown import UnknownTorque, describe_unknowns
+from skidyn.diagnosis._wandering import find_wandering, wandering_torque
 from skidyn.diagnosis._withdrawal import (
     drop_of,
     guess,
@@ -68,7 +69,6 @@ from skidyn.diagnosis._withdrawal import (
     useless,
     without,
 )
-from skidyn.diagnosis._wandering import find_wandering, wandering_torque
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 

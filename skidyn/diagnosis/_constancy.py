@@ -153,9 +153,7 @@ def _instead(
     return best
 
 
-def _imitates(
-    block: _Block, own: Sequence[_Block], without: Tester, whole: Tester
-) -> bool:
+def _imitates(block: _Block, own: Sequence[_Block], without: Tester, whole: Tester) -> bool:
     """Whether a change explains nothing beside an effect, which explains more beside the change."""
     if whole.test(block).chance < CHANGE_LEVEL:
         return False

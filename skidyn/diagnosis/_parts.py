@@ -153,7 +153,8 @@ def best_parts(
 ) -> list[Part | None]:
     """The best part of the recordings for each of some effects with as many columns.
 
-    Of parts that are equally good it is the smallest. It is None if the effect in all of them explains as much.
+    Of parts that are equally good it is the smallest. It is None if the effect in all of them
+    explains as much.
 
     Parameters
     ----------

@@ -112,7 +112,8 @@ class SmoothedTorque(Check):
         step = column_step(motion, AROUND, motion.half_width)
         index, few = motion.thinned(step)
         torque = running_mean(measurement.torque, step)[index]
-        joints = [k for k in np.flatnonzero(measurement.excited) if not _is_noisy(measurement, k)]
+        joints = np.flatnonzero(measurement.excited).tolist()
+        joints = [k for k in joints if not _is_noisy(measurement, k)]
         fewest = min(JOINTS, measurement.n_joints)
         tried = [at_turns(few, torque[:, k], k, others=False) for k in joints]
         # beside other friction, smoothing gains less

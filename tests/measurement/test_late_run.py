@@ -28,9 +28,7 @@ def test_a_load_is_no_lag(loaded):
 
 
 def test_friction_of_a_cold_start_is_no_lag():
-    log = make_hidden_effect_log(
-        load_ur5(), None, n_trajectories=5, duration=6.0, random_state=2
-    )
+    log = make_hidden_effect_log(load_ur5(), None, n_trajectories=5, duration=6.0, random_state=2)
     frame = log.frame.copy()
     first = frame["trajectory"] == frame["trajectory"].iloc[0]
     for k in range(1, 7):
