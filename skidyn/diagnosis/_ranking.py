@@ -27,7 +27,7 @@ from skidyn.diagnosis._hypothesis import (
 )
 from skidyn.diagnosis._parts import part_candidates
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
-from skidyn.diagnosis._recordings import DRIFT, FRICTION, choose, drifting, own_friction
+from skidyn.diagnosis._recordings import DRIFT, FRICTION, choose, drifting, own_effects
 from skidyn.diagnosis._rule import ALL_LEFT, FEW_WAVES, MASKED, NEARLY, RESOLVED, ROUNDS
 from skidyn.diagnosis._screen import Model, Screen
 from skidyn.diagnosis._search_state import SearchState
@@ -286,9 +286,8 @@ class RankingSearch(SearchState):
         pool = [c for c in self.pool if c.term.effect.comes_and_goes and not some_recordings(c)]
         # where friction has changed already, it has changed again
         changed = {c.joints for c in self.chosen if c.kind == DRIFT and some_recordings(c)}
-        friction = own_friction(self.problem, self.kinds)
+        pool += own_effects(self.problem, self.kinds)
         pool = [c for c in pool if c.kind not in FRICTION or c.joints not in changed]
-        pool += [c for c in friction if c.kind == DRIFT or c.joints not in changed]
         found = part_candidates(pool, tester, self.significant, refined, least)
         return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
 

@@ -107,10 +107,10 @@ def everywhere(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
     return [Candidate(term.kind, term, problem.term_rows(term)) for term in terms]
 
 
-def own_friction(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
-    """Friction that the given model contains, which may differ in a part of the recordings.
+def own_effects(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
+    """Friction and offsets of the given model, which may differ in a part of the recordings.
 
-    Each kind by itself, and those of a joint together as friction of another level.
+    Each kind by itself, and the friction of a joint together as friction of another level.
 
     Parameters
     ----------
@@ -120,7 +120,8 @@ def own_friction(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
         Kinds to try.
     """
     tried = set(kinds)
-    terms = [t for t in problem.terms if t.kind in FRICTION and t.kind in tried and not t.is_open]
+    own = {*FRICTION, "offset"} & tried
+    terms = [t for t in problem.terms if t.kind in own and not t.is_open]
     terms += _other_levels(problem, tried, range(problem.n_joints))
     return [Candidate(term.kind, term, problem.term_rows(term)) for term in terms]
 

@@ -94,3 +94,21 @@ def test_elastic_joints_and_inertias_are_not_tried_in_a_part(log):
     passing = {kind for kind in list_effects() if get_effect(kind).comes_and_goes}
     assert {"stribeck", "end_stop", "coupling_spring", "saturation", "base_tilt"} <= passing
     assert not passing & {"joint_elasticity", "backlash", "rotor_inertia", "payload"}
+
+
+def test_an_offset_of_several_joints_is_one_of_the_few_recordings():
+    # beside a function of the position, an offset of the other recordings is as good on a joint
+    log = make_hidden_effect_log(
+        load_planar_arm(), None, noise="low", n_trajectories=7, duration=5.0, random_state=4
+    )
+    torque = np.array(log.y)
+    own = np.isin(log.X["trajectory"].to_numpy(), (2, 3))
+    torque[own] += 8 * log.noise_std
+    model = RBDRegressor(log.robot, effects=["viscous", "coulomb", "offset"])
+
+    found = diagnose(model, log.X, torque, checks=()).findings
+
+    assert {(f.kind, f.joints, f.trajectories) for f in found} == {
+        ("offset", (1,), (2, 3)),
+        ("offset", (2,), (2, 3)),
+    }

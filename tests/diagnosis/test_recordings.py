@@ -8,7 +8,7 @@ import pytest
 
 from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
-from skidyn.diagnosis._recordings import own_friction
+from skidyn.diagnosis._recordings import own_effects
 from skidyn.effects import Signals, make_terms
 from skidyn.evidence import make_problem
 from skidyn.identification import RBDRegressor
@@ -50,7 +50,7 @@ def test_friction_of_the_model_may_have_another_level(log):
     terms = make_terms(["viscous", "coulomb"], 2)
     problem = make_problem(signals, log.y, robot=log.robot, rigid_body=True, terms=terms)
 
-    kinds = [(c.kind, c.joints) for c in own_friction(problem, ["coulomb", "friction_drift"])]
+    kinds = [(c.kind, c.joints) for c in own_effects(problem, ["coulomb", "friction_drift"])]
 
     assert kinds == [(kind, (j,)) for kind in ("coulomb", "friction_drift") for j in (0, 1)]
 

@@ -58,6 +58,21 @@ def test_a_force_beside_the_origin_of_the_tool_is_told_with_its_moment_and_frame
     assert ("turns with the tool" in found.sentence) == bool(frame)
 
 
+def test_a_force_may_act_in_most_recordings():
+    log = make_hidden_effect_log(
+        load_ur5(), None, noise="low", n_trajectories=7, duration=4.0, random_state=0
+    )
+    most = tuple(log.X["trajectory"].unique()[::2].tolist())
+    own = log.X["trajectory"].isin(most).to_numpy()
+    jacobian = log.robot.jacobian(log.X[[f"q{j + 1}" for j in range(6)]].to_numpy()[own])
+    torque = log.y.copy()
+    torque[own] -= np.einsum("iaj,a->ij", jacobian[:, :3], [3.0, 0.0, -2.0])
+
+    (found,) = diagnosed(log, torque).findings
+
+    assert (found.kind, found.trajectories) == ("external_wrench", most)
+
+
 @pytest.mark.slow
 def test_another_load_is_one_of_other_recordings():
     # two thirds of the recordings carry one, so that each has its own size only if all are needed

@@ -18,6 +18,17 @@ def test_a_function_of_signals_follows_their_product_and_no_other(signals, left_
     assert left_by(columns, np.sin(17 * signals.time)) > 0.5
 
 
+def test_friction_over_two_signals_follows_one_velocity_and_two_others(signals, left_by):
+    effect = get_effect("friction_over_two_signals")
+    names = ("dq1", "q1", "q2")
+    assert effect.admits(names)
+    assert not effect.admits(("dq1", "dq2", "q1")) and not effect.admits(("dq1", "q1"))
+    columns = effect.columns(signals, 0, **effect.shape_of(signals, names))
+    load = 2.0 + signals.q[:, 0] * signals.q[:, 1]
+    assert left_by(columns, load * signals.sign[:, 0]) < 1e-6
+    assert left_by(columns, load) > 0.3
+
+
 def test_a_function_of_a_sum_follows_no_other_sum(signals, left_by):
     effect = get_effect("function_of_sum")
     columns = effect.columns(signals, 0, **effect.shape_of(signals, (0, 1), (1.0, -1.0)))
