@@ -53,15 +53,15 @@ def run(options: argparse.Namespace) -> None:
             if not options.json:
                 for note in frame.attrs["notes"]:
                     print(f"note: {note}")
-                print(measured.table, flush=True)
+                print(measured.motion_table, flush=True)
             checking.enter_context(working("Checking", options))
 
         quality = check_log(frame, robot, measured=show)
     if options.json:
         print_json(quality.to_dict())
     else:
-        if quality.problems:
-            print(f"\n{quality.problems}")
+        for part in filter(None, (quality.torque_table, quality.problems)):
+            print(f"\n{part}")
         remedies = [c.remedy.option for c in quality.checks if c.remedy and c.certainty != "noted"]
         if remedies:
             print("\nto fix all of these problems and check again:")

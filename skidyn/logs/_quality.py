@@ -154,11 +154,11 @@ class LogQuality:
         return content
 
     def __str__(self) -> str:
-        return "\n\n".join(part for part in (self.table, self.problems) if part)
+        return "\n\n".join(filter(None, (self.motion_table, self.torque_table, self.problems)))
 
     @property
-    def table(self) -> str:
-        """The numbers of the log and of each joint."""
+    def motion_table(self) -> str:
+        """Numbers of the log, and of the motion of each joint."""
         lines = [
             f"{self.n_samples} samples in {self.n_trajectories} "
             f"{'trajectory' if self.n_trajectories == 1 else 'trajectories'}, "
@@ -166,14 +166,20 @@ class LogQuality:
             f"gaps: {self.gaps} (longest step {self.largest_gap:.3g} s), "
             f"repeated rows: {self.repeated_rows}",
             "",
+            *self._table(_MOTION_HEAD, _motion_cells),
         ]
-        width = max([len(joint.name) for joint in self.joints] + [5])
-        # two tables, so that a terminal of 80 columns holds them
-        lines.append(f"{'joint':{width}s}{_MOTION_HEAD}")
-        lines += [f"{joint.name:{width}s}{_motion_cells(joint)}" for joint in self.joints]
-        lines += ["", f"{'joint':{width}s}{_TORQUE_HEAD}"]
-        lines += [f"{joint.name:{width}s}{_torque_cells(joint)}" for joint in self.joints]
         return "\n".join(lines)
+
+    @property
+    def torque_table(self) -> str:
+        """Numbers of the torque of each joint."""
+        return "\n".join(self._table(_TORQUE_HEAD, _torque_cells))
+
+    def _table(self, head: str, cells: Callable[[JointQuality], str]) -> list[str]:
+        """Lines of one of two tables, each of which a terminal of 80 columns holds."""
+        width = max([len(joint.name) for joint in self.joints] + [5])
+        rows = [f"{joint.name:{width}s}{cells(joint)}" for joint in self.joints]
+        return [f"{'joint':{width}s}{head}", *rows]
 
     @property
     def problems(self) -> str:
@@ -201,8 +207,8 @@ def check_log(
         For its limits (coverage, units) and its dynamics: signs, order, gravity, scale and delay of
         the recording are tested by fitting the robot to it.
     measured : callable, optional
-        Called with the report without ``checks`` as soon as its numbers are known: the checks take
-        most of the time.
+        Called with the report without ``checks`` and delays of torques as soon as its other
+        numbers are known: the checks take most of the time.
 
     Returns
     -------
@@ -223,7 +229,7 @@ def check_log(
     >>> quality.n_samples, round(quality.rate), quality.gaps
     (400, 100, 0)
     """
-    from skidyn.measurement import check_measurement  # also imports the fits
+    from skidyn.measurement import check_measurement, measured_delay  # also imports the fits
 
     measurement, n_trajectories, messages = _measured(frame, robot)
     quality = LogQuality(
@@ -246,7 +252,12 @@ def check_log(
         checks = by_influence(
             frame, robot, checks, lambda log, own: _measured(log, own)[0], measurement.robot
         )
-    return replace(quality, checks=tuple(checks))
+    delay = measured_delay(measurement)  # of what the checks have corrected
+    joints = tuple(
+        joint if delay is None else replace(joint, torque_delay=float(delay.joints[k]))
+        for k, joint in enumerate(quality.joints)
+    )
+    return replace(quality, joints=joints, checks=tuple(checks))
 
 
 def _measured(frame: pd.DataFrame, robot: Robot | None) -> tuple[Measurement, int, list[str]]:
@@ -304,10 +315,10 @@ def _measured(frame: pd.DataFrame, robot: Robot | None) -> tuple[Measurement, in
 
 
 def _joints(measurement: Measurement) -> list[JointQuality]:
-    from skidyn.measurement import measured_delay, rest_share, reversals
+    """Numbers of each joint, without the delay of its torque."""
+    from skidyn.measurement import rest_share, reversals
 
     signals, robot = measurement.signals, measurement.robot
-    found = measured_delay(measurement)
     joints = []
     for k, name in enumerate(measurement.joint_names):
         q, dq, tau = signals.q[:, k], signals.dq[:, k], measurement.torque[:, k]
@@ -330,7 +341,7 @@ def _joints(measurement: Measurement) -> list[JointQuality]:
                 saturated_share=measurement.at_limit[k],
                 velocity_slope=slope,
                 velocity_correlation=correlation,
-                torque_delay=np.nan if found is None else float(found.joints[k]),
+                torque_delay=np.nan,
                 excited=measurement.excited[k],
             )
         )
