@@ -123,6 +123,6 @@ def wandering_torque(found: dict[int, tuple[float, float]]) -> Finding:
         (),
         "the same motion again, and rest at the same pose, where only time changes the torque",
         sentence,
-        "the torque at rest over time",
+        "diagnosis.comparison_after.residual",
         (),
     )
