@@ -21,8 +21,9 @@ from skidyn._signals import Array, Signals
 
 #: Lowest frequency in Hz; share of the sampling rate that is the highest.
 LOWEST, HIGHEST = 0.3, 0.45
-#: Number of frequencies around a line whose median is its noise, and least rows of a segment.
-NEIGHBOURS, SHORTEST = 201, 32
+#: Number of frequencies around a line whose median is its noise, least rows of a segment, and least
+#: number of frequencies.
+NEIGHBOURS, SHORTEST, FEWEST = 201, 32, 10
 #: Chance of a line, over all frequencies, below which it is tested.
 WORTH = 0.01
 #: Rows per second in which a slow wave is searched, frequencies of the spectrum per resolved one,
@@ -93,7 +94,7 @@ def clock_line(
         power += one / max(one.mean(), np.finfo(float).tiny)
     frequency = np.fft.rfftfreq(points, 1 / rate)
     inside = (frequency > band[0]) & (frequency < min(band[1], HIGHEST * rate))
-    if inside.sum() < 10:
+    if inside.sum() < FEWEST:
         return None
     here, m = power[inside], len(segments)
     level = median_filter(here, min(NEIGHBOURS * points // 4096 | 1, len(here)))
@@ -164,6 +165,7 @@ def slow_lines(
         separable from it.
     """
     found = []
+    band = (band[0], min(band[1], HIGHEST * signals.rate))
     for time, shape in ((signals.clock, {}), (signals.since_start, {"since_start": 1.0})):
         frequency = _slow_line(time, residual, carriers, use, band)
         if frequency is not None and not _in_motion(signals, time, frequency):
@@ -189,47 +191,53 @@ def _slow_line(
     use: NDArray[np.bool_],
     band: tuple[float, float],
 ) -> float | None:
+    """Frequency of the strongest wave with a common phase, Hz; None if it does not stand out."""
     if use.sum() < SHORTEST or np.ptp(time[use]) > LONGEST:
         return None
     own = np.column_stack([carrier[use] for carrier in carriers])
     own = own / np.maximum(np.sqrt(np.mean(own**2, axis=0)), np.finfo(float).tiny)
     place = ((time[use] - time[use].min()) * SLOW_RATE).astype(np.int64)
-    count = int(place.max()) + 1
+    count, n = int(place.max()) + 1, len(carriers)
     points = 2 ** int(np.ceil(np.log2(FINER * count)))
     frequency = np.fft.rfftfreq(points, 1 / SLOW_RATE)
     inside = (frequency > band[0]) & (frequency < band[1])
+    if inside.sum() < FEWEST:
+        return None
     weighted = own * residual[use][:, None]
     waves = np.array([np.fft.rfft(np.bincount(place, w, count), points) for w in weighted.T])
     inverse = np.linalg.pinv(own.T @ own)
     power = np.real(np.einsum("kf,kl,lf->f", waves.conj(), inverse, waves))[inside]
-    k = len(carriers)
-    width = max(3, int(AROUND / frequency[1]) | 1)
-    sparse = max(1, width // NEIGHBOURS)  # the median of the largest of some has the same shape
-    level = np.interp(
-        frequency[inside],
-        frequency[inside][::sparse],
-        median_filter(power[::sparse], max(3, width // sparse | 1)),
-    )
-    ratio = power / np.maximum(level, np.finfo(float).tiny) * gamma.median(k)
+    width = max(3, int(AROUND / frequency[1]))
+    sparse = max(1, width // NEIGHBOURS)
+    some = slice(None, None, sparse)
+    nearby = median_filter(power[some], max(3, width // sparse | 1))
+    level = np.interp(frequency[inside], frequency[inside][some], nearby)
+    ratio = power / np.maximum(level, np.finfo(float).tiny) * gamma.median(n)
     best = int(np.argmax(power))
-    chance = float(gamma.sf(ratio[best], k)) * int(inside.sum()) / FINER
+    chance = float(gamma.sf(ratio[best], n)) * int(inside.sum()) / FINER
     if chance > WORTH or not 0 < best < len(power) - 1:
         return None
-    # Motion is not orthogonal to a wave of few periods, so that its line is shifted.
     held = np.flatnonzero(np.bincount(place))
-    mean = np.bincount(place)[held]
-    at = np.bincount(place, time[use])[held] / mean
-    y, *columns = (np.bincount(place, v)[held] / mean for v in (residual[use], *own.T))
+    values = np.column_stack([time[use], residual[use], own])
+    means = [np.bincount(place, v)[held] / np.bincount(place)[held] for v in values.T]
+    reach = FINER * float(frequency[1])
+    return _exact(float(frequency[inside][best]), reach, *means)
+
+
+def _exact(middle: float, reach: float, time: Array, residual: Array, *carriers: Array) -> float:
+    """Frequency near a line at which the wave leaves least beside the signals themselves.
+
+    Motion is not orthogonal to a wave of few periods, so that its line is shifted.
+    """
 
     def left(tried: float) -> float:
-        waves = np.exp(2j * np.pi * tried * at)
-        parts = [c * part for c in columns for part in (waves.real, waves.imag)]
-        block = np.column_stack([*parts, *columns, np.ones_like(y)])
-        rest = y - block @ np.linalg.lstsq(block.T @ block, block.T @ y, rcond=1e-12)[0]
-        return float(rest @ rest)
+        waves = np.exp(2j * np.pi * tried * time)
+        parts = [c * part for c in carriers for part in (waves.real, waves.imag)]
+        block = np.column_stack([*parts, *carriers, np.ones_like(time)])
+        size = np.linalg.lstsq(block.T @ block, block.T @ residual, rcond=1e-12)[0]
+        return float(np.sum((residual - block @ size) ** 2))
 
-    middle, reach = float(frequency[inside][best]), FINER * float(frequency[1])
     steps = middle + np.linspace(-reach, reach, 4 * FINER + 1)
-    k = int(np.argmin([left(tried) for tried in steps]))
-    bounds = (steps[max(0, k - 1)], steps[min(len(steps) - 1, k + 1)])
+    best = int(np.argmin([left(tried) for tried in steps]))
+    bounds = (steps[max(0, best - 1)], steps[min(len(steps) - 1, best + 1)])
     return float(minimize_scalar(left, bounds=bounds, method="bounded").x)
