@@ -82,17 +82,27 @@ def _between_reversals(problem: Problem) -> float:
 
 def _from_others(time: Array, values: Array, apart: float) -> Array:
     """Line through the values before and after each time; NaN where too few are known."""
-    distance = time - time[:, None]
-    size = np.abs(distance)
-    near = (size > NEAREST * apart) & (size < FARTHEST * apart)
-    sides = np.minimum((near & (distance > 0)).sum(1), (near & (distance < 0)).sum(1))
-    weight = near.astype(float)
-    total = np.maximum(weight.sum(1), 1e-300)
-    mean = (weight * distance).sum(1) / total
-    level = weight @ values / total
-    moved = weight * (distance - mean[:, None])
-    slope = moved @ values / np.maximum((moved * distance).sum(1), 1e-300)
-    return np.where(sides >= FEWEST_BESIDE, level - slope * mean, np.nan)
+    order = np.argsort(time)
+    t = time[order] - time.mean()
+    moments = np.column_stack([np.ones_like(t), t, t**2, values[order], t * values[order]])
+    # of all rows before each one, so that the memory grows with the rows and not their square
+    before = np.vstack([np.zeros(moments.shape[1]), np.cumsum(moments, axis=0)])
+
+    def between(low: float, high: float) -> Array:
+        """Sums over the rows between two distances from each one."""
+        first = np.searchsorted(t, t + low * apart, side="right")
+        last = np.searchsorted(t, t + high * apart, side="left")
+        return np.asarray(before[np.maximum(first, last)] - before[first])
+
+    sides = between(-FARTHEST, -NEAREST), between(NEAREST, FARTHEST)
+    fewest = np.minimum(sides[0][:, 0], sides[1][:, 0])
+    count, *sums = np.add(*sides).T
+    mean_t, square, level, product = (total / np.maximum(count, 1.0) for total in sums)
+    spread = np.maximum(square - mean_t**2, np.finfo(float).tiny)
+    predicted = level + (product - mean_t * level) / spread * (t - mean_t)
+    found: Array = np.empty(len(t))
+    found[order] = np.where(fewest >= FEWEST_BESIDE, predicted, np.nan)
+    return found
 
 
 def wandering_torque(found: dict[int, tuple[float, float]]) -> Finding:

@@ -69,7 +69,7 @@ class JointFit:
     def with_columns(self, columns: Array) -> JointFit:
         """The same fit with further columns of each joint, shape (n_rows, n_fitted_joints, n)."""
         other, n = copy(self), columns.shape[2]
-        first = 1 + max(int(place.max()) for place in self.places)
+        first = 1 + max((int(place.max()) for place in self.places), default=-1)
         other.designs, other.places = [], []
         for j, (design, place, use) in enumerate(
             zip(self.designs, self.places, self.rows, strict=True)
