@@ -140,13 +140,31 @@ class JudgingSearch(ChoosingSearch):
         # The error of an imperfect formula does not become noise by one known effect.
         known = hypothesis.kind != UNKNOWN and not within_recordings(hypothesis)
         most = self._mostly_small(joints, hypothesis.gain, own, 0.5 * self.left)
-        if not known or most:
+        if not known or most or self._second_of_velocity(hypothesis):
             return True
         # Nor does it vanish on several joints by one force.
         several = all(len(c.rows) > 1 for c in hypothesis.candidates)
         if several and not self._mostly_small(joints, hypothesis.gain, own, ALL_LEFT * self.left):
             return False
         return self._price(hypothesis.candidates) > settings.white
+
+    def _second_of_velocity(self, hypothesis: Hypothesis) -> bool:
+        """Whether an earlier effect follows the velocity of the same joints.
+
+        What one formula of friction leaves, another one may well describe.
+        """
+
+        def joints_of(h: Hypothesis) -> set[int]:
+            return {
+                j
+                for c in h.candidates
+                if c.term.effect.scope == "joint" and c.term.effect.drawn_against == "dq"
+                for j in c.joints
+            }
+
+        own = joints_of(hypothesis)
+        before = {j for h in [*self.earlier, *self.findings] for j in joints_of(h)}
+        return set(hypothesis.joints) <= own & before
 
     def _beyond_formulas(self, hypothesis: Hypothesis) -> bool:
         """Whether no other formulas of the earlier effects could explain what an explanation does.

@@ -229,7 +229,8 @@ class ReconsideringSearch(JudgingSearch):
             before = self.left
             self.add(shadow)
             self.refit()
-            if self._competed_again(old) is not None:
+            winner = self._competed_again(old)
+            if winner is not None and winner.kind != old.kind:
                 counts = self.problem.rows.counts
                 gain = float(log_likelihood_gain(before[None], self.left[None], counts).sum())
                 added = sum(h.n_parameters for h in self.findings)
