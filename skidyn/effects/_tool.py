@@ -250,6 +250,9 @@ class ExternalWrench(_ToolEffect):
 
 #: Power of the depth with which the force between round bodies grows (Hertz 1882).
 _HERTZ = 1.5
+#: Number of places at which a ball is tried, their spread in standard deviations of the motion, and
+#: the share of the motion that its surface leaves inside.
+_PLACES, _SPREAD, _INSIDE = 20, 1.3, 0.22
 #: Directions (azimuth and elevation in rad) of planes that are tried in addition to the axes: walls
 #: and tilted tables.
 _OBLIQUE = (
@@ -258,11 +261,16 @@ _OBLIQUE = (
 )
 
 
-class EnvironmentContact(Effect):
-    """A soft plane that the tool presses into.
+#: Entries of the shape of a ball.
+_BALL = ("radius", "center_x", "center_y", "center_z")
 
-    Its normal is an axis of the base, or has the direction ``azimuth`` and ``elevation``; then the
-    plane is at ``z0`` relative to the point ``x``, ``y``, ``z``. A contact of round bodies
+
+class EnvironmentContact(Effect):
+    """A soft surface that the tool presses into.
+
+    It is a plane, whose normal is an axis of the base, or has the direction ``azimuth`` and
+    ``elevation``; then the plane is at ``z0`` relative to the point ``x``, ``y``, ``z``. Or it is a
+    ball of a ``radius`` about ``center_x``, ``center_y``, ``center_z``. A contact of round bodies
     stiffens: then the force grows with another ``power`` of the depth (1 if the shape has none), in
     units of 1 m, so that the unit of the stiffness is the same. A contact that loses energy has a
     larger force during approach, by the factor ``1 + damping`` times the speed of the approach
@@ -282,9 +290,15 @@ class EnvironmentContact(Effect):
         Shape("azimuth", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("elevation", "rad", (), -np.pi / 2, np.pi / 2, spacing="linear", scales=False),
         Shape("damping", "s/m", (), 1e-2, 1e3, scales=False, has_interval=False),
+        Shape("radius", "m", (), 1e-3, 1e2, scales=False),
+        *(
+            Shape(f"center_{a}", "m", (), -np.inf, np.inf, spacing="linear", scales=False)
+            for a in "xyz"
+        ),
     )
     forms = (
         *({"azimuth": a, "elevation": e} for a, e in _OBLIQUE),
+        dict.fromkeys(_BALL, 0.0),
         {"power": _HERTZ},
         {"damping": 2.0},
     )
@@ -303,7 +317,7 @@ class EnvironmentContact(Effect):
         ]
 
     def _grid_of(self, position: Array) -> list[dict[str, Any]]:
-        """Planes for positions of the tool."""
+        """Surfaces for positions of the tool."""
         along_axes = [
             {
                 "z0": float(side * np.quantile(side * position[:, axis], share)),
@@ -315,7 +329,7 @@ class EnvironmentContact(Effect):
             for share in (0.05, 0.1, 0.15, 0.2, 0.3)
         ]
         oblique = []
-        *planes, stiffening, damped = map(dict, self.forms)
+        *planes, _, stiffening, damped = map(dict, self.forms)
         for form in planes:
             height = position @ _normal(form)
             for share in (0.06, 0.12, 0.25):
@@ -324,10 +338,26 @@ class EnvironmentContact(Effect):
                 at = dict(zip("xyz", map(float, place), strict=True))
                 oblique.append({"z0": float(edge - place @ _normal(form))} | form | at)
         plain = along_axes + oblique
-        return plain + [shape | form for form in (stiffening, damped) for shape in plain[1::3]]
+        further = [shape | form for form in (stiffening, damped) for shape in plain[1::3]]
+        return plain + further + self._balls(position)
+
+    @staticmethod
+    def _balls(position: Array) -> list[dict[str, Any]]:
+        """Balls about places within the motion and around it, each with some of the motion inside."""
+        from scipy.special import ndtri
+        from scipy.stats import qmc
+
+        places = ndtri(qmc.Halton(3, scramble=False).random(_PLACES + 1)[1:])
+        balls = []
+        for center in position.mean(axis=0) + _SPREAD * position.std(axis=0) * places:
+            radius = np.quantile(np.linalg.norm(position - center, axis=1), _INSIDE)
+            balls.append(dict(zip(_BALL, map(float, (radius, *center)), strict=True)))
+        return balls
 
     def meaning(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         told = _at_point(parameters)
+        if "radius" in parameters:
+            told = f"The surface is a ball. {told}".rstrip()
         if "axis" in parameters:
             sign = "−" if parameters["side"]["value"] < 0 else "+"
             axis = "xyz"[int(parameters["axis"]["value"])]
@@ -338,13 +368,19 @@ class EnvironmentContact(Effect):
         return bool(FEWEST_TOUCHING < np.mean(_depth(signals, shape) > 0) < MOST_TOUCHING)
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        return float(np.ptp(tool_position(signals, shape) @ _normal(shape)))
+        position = tool_position(signals, shape)
+        if "radius" in shape:
+            return float(np.max(np.ptp(position, axis=0)))
+        return float(np.ptp(position @ _normal(shape)))
 
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
         jacobian = tool_jacobian(signals, shape)
-        reach = np.einsum("ian,a->in", jacobian, _normal(shape))
+        if "radius" in shape:
+            reach = np.einsum("ian,ia->in", jacobian, _outwards(signals, shape)[0])
+        else:
+            reach = np.einsum("ian,a->in", jacobian, _normal(shape))
         pressure = _depth(signals, shape) ** shape.get("power", 1.0)
         if "damping" in shape:
             approach = -np.sum(reach * signals.dq, axis=1)
@@ -367,8 +403,18 @@ def _normal(shape: Mapping[str, Any]) -> Array:
     return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
 
+def _outwards(signals: Signals, shape: Mapping[str, Any]) -> tuple[Array, Array]:
+    """Direction of the tool from the center of a ball, (n_samples, 3), and its distance in m."""
+    center = np.array([shape[name] for name in _BALL[1:]])
+    away = tool_position(signals, shape) - center
+    distance = np.sqrt(np.einsum("ia,ia->i", away, away))
+    return away / np.maximum(distance, np.finfo(float).tiny)[:, None], distance
+
+
 def _depth(signals: Signals, shape: Mapping[str, Any]) -> Array:
-    """Depth of the tool in a plane in m, 0 outside, shape (n_samples,)."""
+    """Depth of the tool in a surface in m, 0 outside, shape (n_samples,)."""
+    if "radius" in shape:
+        return np.asarray(np.maximum(0.0, shape["radius"] - _outwards(signals, shape)[1]))
     position, normal = tool_position(signals, shape), _normal(shape)
     if "azimuth" in shape:
         position = position - np.array([shape[axis] for axis in "xyz"])

@@ -100,6 +100,22 @@ def test_a_plane_that_faces_no_axis_pushes_along_its_normal(signals):
         np.testing.assert_allclose(oblique[joint], faces_x[joint], atol=1e-12)
 
 
+def test_a_ball_pushes_away_from_its_center(signals, robot):
+    effect = get_effect("environment_contact")
+    tool, _ = robot.forward_kinematics(signals.q)
+    center = tool.mean(axis=0) + [0.0, 0.3, 0.0]
+    away = tool - center
+    distance = np.linalg.norm(away, axis=1)
+    radius = float(np.median(distance))
+    shape = dict(zip(("center_x", "center_y", "center_z"), center, strict=True), radius=radius)
+    force = np.maximum(0.0, radius - distance)[:, None] * away / distance[:, None]
+    blocks = effect.torque_columns(signals, (0, 1), **shape)
+    jacobian = robot.jacobian(signals.q)[:, :3]
+    for joint in (0, 1):
+        expected = -np.einsum("ia,ia->i", jacobian[:, :, joint], force)
+        np.testing.assert_allclose(blocks[joint][:, 0], expected, atol=1e-12)
+
+
 def test_what_is_pressed_between_round_bodies_stiffens(signals):
     effect = get_effect("environment_contact")
     plane = {"axis": 2, "side": 1.0, "z0": 0.4}
@@ -159,3 +175,22 @@ def test_a_contact_of_the_tool_is_found_with_the_link_that_touches():
     assert finding.parameters["point"]["value"] == TOOL
     assert finding.parameters["z0"]["value"] == pytest.approx(floor, abs=0.02)
     assert f"link '{TOOL}'" in finding.sentence
+
+
+def test_a_ball_that_the_tool_presses_into_is_found_with_its_size():
+    robot = with_tool()
+    log = make_hidden_effect_log(robot, None, n_trajectories=6, duration=5.0, random_state=1)
+    q = log.X[["q1", "q2", "q3"]].to_numpy()
+    tool, _ = robot.forward_kinematics(q, TOOL)
+    away = tool - (tool.mean(axis=0) + [0.3, 0.1, -0.2])
+    distance = np.linalg.norm(away, axis=1)
+    radius = float(np.quantile(distance, 0.2))
+    force = 2000.0 * np.maximum(0.0, radius - distance)[:, None] * away / distance[:, None]
+    torque = log.y + np.einsum("iaj,ia->ij", robot.jacobian(q, TOOL)[:, :3], -force)
+
+    (finding,) = diagnose(RBDRegressor(robot), log.X, torque, checks=()).findings
+
+    assert finding.kind == "environment_contact"
+    assert finding.parameters["radius"]["value"] == pytest.approx(radius, rel=0.1)
+    assert finding.parameters["k"]["value"] == pytest.approx(2000.0, rel=0.2)
+    assert "The surface is a ball." in finding.sentence
