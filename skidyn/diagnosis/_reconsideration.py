@@ -23,7 +23,7 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
-from skidyn.diagnosis._rule import BETWEEN
+from skidyn.diagnosis._rule import BETWEEN, NEARLY
 from skidyn.effects import Term, get_effect
 
 
@@ -150,12 +150,7 @@ class ReconsideringSearch(JudgingSearch):
         """Replace an earlier finding by the now best one: another kind, or a better shape."""
         kept = self._state()
         place = self.findings.index(old)
-        self.findings.remove(old)
-        self.chosen = [c for c in self.chosen if c not in old.candidates]
-        taken = {c.site for c in self.chosen}
-        self.pool = [c for c in self.whole_pool if c.site not in taken]
-        self.refit()
-        self.sigma, self.left = self.weights(), self._left()
+        self._take_out(old)
         self._reconsidering = True
         ranking = self.rank()
         best = self.accepted(ranking)
@@ -176,6 +171,29 @@ class ReconsideringSearch(JudgingSearch):
         self.refit()
         self.sigma, self.left = self.weights(), self._left()
         return best
+
+    def _take_out(self, old: Hypothesis) -> None:
+        """Continue without a finding, whose place is free for others."""
+        self.findings.remove(old)
+        self.chosen = [c for c in self.chosen if c not in old.candidates]
+        taken = {c.site for c in self.chosen}
+        self.pool = [c for c in self.whole_pool if c.site not in taken]
+        self.refit()
+        self.sigma, self.left = self.weights(), self._left()
+
+    def _has_rival(self, old: Hypothesis) -> bool:
+        """Whether another known kind, alone in the place of a finding, is nearly as good as it.
+
+        A fraction of the time of a whole competition, in which it then wins or loses.
+        """
+        kept = self._state()
+        self._take_out(old)
+        known = sorted(self._greedy_by_kind(nameless=False), key=lambda item: item[1])
+        others = [c for c, _ in known if c[0].kind != old.kind][: self.settings.refined]
+        again = max((h.score for h in self._finals([list(old.candidates)])), default=0.0)
+        best = max((h.score for h in self._finals(others)), default=-np.inf)
+        self._restore(kept)
+        return bool(best > NEARLY * again)
 
     def _score_without(self, best: Hypothesis) -> float:
         """Score of an explanation by the torque of a model that lacks what it replaces.
@@ -229,7 +247,7 @@ class ReconsideringSearch(JudgingSearch):
             before = self.left
             self.add(shadow)
             self.refit()
-            winner = self._competed_again(old)
+            winner = self._competed_again(old) if self._has_rival(old) else None
             if winner is not None and winner.kind != old.kind:
                 counts = self.problem.rows.counts
                 gain = float(log_likelihood_gain(before[None], self.left[None], counts).sum())

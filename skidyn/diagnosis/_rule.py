@@ -94,8 +94,9 @@ NEARER = 0.5
 #: multiple of the squared error: where an effect is much larger than the noise, what its imperfect
 #: formula may leave is, too.
 STANDS_OUT = 4.0
-#: Share of the best score from which other forms of another kind are tried, and another pair of
-#: joints of a coupling is told with the best one (``_ranking.py``, ``_acceptance.py``).
+#: Share of the best score from which other forms of another kind are tried, another pair of joints
+#: of a coupling is told with the best one, and another kind may replace a finding beside a later
+#: one (``_ranking.py``, ``_acceptance.py``, ``_reconsideration.py``).
 NEARLY = 0.9
 #: Share of a recording within which a change at its beginning or end lies between two recordings.
 BETWEEN = 0.02

@@ -343,7 +343,7 @@ class EnvironmentContact(Effect):
 
     @staticmethod
     def _balls(position: Array) -> list[dict[str, Any]]:
-        """Balls about places within the motion and around it, each with some of the motion inside."""
+        """Balls about places within and around the motion, each with some of it inside."""
         from scipy.special import ndtri
         from scipy.stats import qmc
 
