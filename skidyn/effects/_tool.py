@@ -282,7 +282,7 @@ class EnvironmentContact(Effect):
     title = "Contact with the environment"
     formula = (
         r"-J_n(q)^\top n\,k\,x^p\,\max(0,\ 1 + d\,\dot x),"
-        r"\quad x = \max(0,\ z_0 - n^\top p(q))"
+        r"\quad x = \max(0,\ z_0 - n^\top p(q)) \text{ or } \max(0,\ r - |p(q) - c|)"
     )
     coefficients = (Coefficient("k", "N/m", sign=1),)
     shapes = (
