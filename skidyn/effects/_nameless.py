@@ -96,6 +96,25 @@ class _Spline(NamelessEffect):
         return splines(x, shape["low"], shape["high"], self.n_splines)
 
 
+def _sliding(signals: Signals, joint: int, prefix: str = "") -> dict[str, float]:
+    """Middle and length in m of the range of a slider; nothing for a joint that turns."""
+    if not signals.prismatic[joint]:
+        return {}
+    low, high = supported_range(signals, signals.q[:, joint])
+    return {f"{prefix}middle": (low + high) / 2, f"{prefix}span": high - low} if high > low else {}
+
+
+def _angle(signals: Signals, joint: int, shape: Mapping[str, Any], prefix: str = "") -> Array:
+    """Position in rad, (n_samples,); a slider moves over its range in half a turn.
+
+    Few harmonics represent a smooth function of an angle. In a fixed unit of length, a slider with
+    a long way would turn round many times.
+    """
+    middle, span = shape.get(f"{prefix}middle", 0.0), shape.get(f"{prefix}span")
+    unit = float(signals.unit[joint]) if span is None else span / np.pi
+    return np.asarray((signals.q[:, joint] - middle) / unit)
+
+
 class FunctionOfPosition(_Spline):
     """A smooth function of the joint's own position."""
 
@@ -129,8 +148,11 @@ class FrictionOverPosition(NamelessEffect):
     coefficients = unnamed_coefficients(6)
     depends_on = ("q_own", "dq_own")
 
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        return [dict(_sliding(signals, joints[0]))]
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        x = signals.q[:, joint] / signals.unit[joint]
+        x = _angle(signals, joint, shape)
         dq, sign = signals.dq[:, joint], signals.sign[:, joint]
         waves = [np.cos(x), np.sin(x), np.cos(2 * x), np.sin(2 * x)]
         return np.column_stack([*(w * dq for w in waves), *(w * sign for w in waves[:2])])
@@ -177,12 +199,7 @@ class FunctionOfPositionAndVelocity(_Spline):
         return np.hstack([orders * m[:, None] for m in motion])
 
 
-class _WithOther(NamelessEffect):
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        return self.others(signals, joints[0])
-
-
-class FunctionOfTwoPositions(_WithOther):
+class FunctionOfTwoPositions(NamelessEffect):
     """A smooth torque that depends on two positions: a cable, a hose, a closed chain."""
 
     kind = "function_of_two_positions"
@@ -191,9 +208,16 @@ class FunctionOfTwoPositions(_WithOther):
     coefficients = unnamed_coefficients(7)
     depends_on = ("q_own", "q_other")
 
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        own = _sliding(signals, joints[0])
+        return [
+            shape | own | _sliding(signals, shape["other"], "other_")
+            for shape in self.others(signals, joints[0])
+        ]
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        k = int(shape["other"])
-        x, y = (signals.q[:, i] / signals.unit[i] for i in (joint, k))
+        x = _angle(signals, joint, shape)
+        y = _angle(signals, int(shape["other"]), shape, "other_")
         return np.column_stack(
             [
                 np.cos(x - y),
@@ -207,7 +231,7 @@ class FunctionOfTwoPositions(_WithOther):
         )
 
 
-class FrictionOverOtherPosition(_WithOther):
+class FrictionOverOtherPosition(NamelessEffect):
     """Friction of one joint that varies with the position of another."""
 
     kind = "friction_over_other_position"
@@ -217,14 +241,19 @@ class FrictionOverOtherPosition(_WithOther):
     coefficients = unnamed_coefficients(4)
     depends_on = ("dq_own", "q_other")
 
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        return [
+            shape | _sliding(signals, shape["other"], "other_")
+            for shape in self.others(signals, joints[0])
+        ]
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        k = int(shape["other"])
-        y = signals.q[:, k] / signals.unit[k]
+        y = _angle(signals, int(shape["other"]), shape, "other_")
         motion = (signals.sign[:, joint], signals.dq[:, joint])
         return np.column_stack([wave * m for m in motion for wave in (np.cos(y), np.sin(y))])
 
 
-class FunctionOfTwoVelocities(_WithOther):
+class FunctionOfTwoVelocities(NamelessEffect):
     """Drag of one joint that depends on the velocity of another."""
 
     kind = "function_of_two_velocities"
@@ -233,6 +262,9 @@ class FunctionOfTwoVelocities(_WithOther):
     formula = r"f(\dot q_j, \dot q_k)"
     coefficients = unnamed_coefficients(6)
     depends_on = ("dq_own", "dq_other")
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        return self.others(signals, joints[0])
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         k = int(shape["other"])
