@@ -29,9 +29,7 @@ def test_friction_over_acceleration_opposes_the_motion_and_grows_with_its_size(s
     assert get_effect("friction_over_acceleration").variables(0, shape) == ("dq1", "ddq1")
 
 
-def test_friction_over_the_position_of_a_long_slider_is_as_smooth_as_over_an_angle(
-    signals, left_by
-):
+def test_friction_over_the_position_of_a_long_slider_is_smooth(signals, left_by):
     slides = signals.with_(prismatic=np.ones(signals.n_joints, dtype=bool))
     friction = slides.dq[:, 0] * (slides.q[:, 1] - slides.q[:, 1].mean()) ** 2
     effect = get_effect("friction_over_other_position")
