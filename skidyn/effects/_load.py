@@ -18,11 +18,12 @@ MOVES, DRIVEN = 0.05, 0.05
 
 
 def _carried(signals: Signals, joint: int, shape: Mapping[str, Any]) -> Array:
-    """Torque that the gear transmits, with the drive's own friction and damping."""
+    """Torque that the gear transmits, with the drive's own friction, damping and inertia."""
     assert signals.load is not None
     dry = shape.get("friction", 0.0) * signals.sign[:, joint]
     viscous = shape.get("damping", 0.0) * signals.dq[:, joint]
-    carried: Array = signals.load[:, joint] + dry + viscous
+    rotor = shape.get("inertia", 0.0) * signals.ddq[:, joint]
+    carried: Array = signals.load[:, joint] + dry + viscous + rotor
     return carried
 
 
@@ -35,11 +36,13 @@ class LoadDependentFriction(Effect):
     load moves the joint, as for the efficiency of many gears. With ``viscous``, it also grows with
     the speed, in units of 1 rad/s or 1 m/s, so that ``mu`` has no unit. If the torque of the drive
     counts, the load includes the ``friction`` (N m or N) and the ``damping`` that the drive has to
-    overcome as well. The friction of a preloaded gear depends on the load above a ``threshold``, N
-    m or N; that of a single rubbing flank depends on load of one sign (``side``, 1 or -1).
+    overcome as well, and the ``inertia`` of the rotor (kg m^2 or kg) that it accelerates. The
+    friction of a preloaded gear depends on the load above a ``threshold``, N m or N; that of a
+    single rubbing flank depends on load of one sign (``side``, 1 or -1).
 
     The gear transmits the torque that the bodies need at the joint; the torque that accelerates the
-    rotor acts before the gear and is not part of the load.
+    rotor acts before the gear and is part of the load only with an ``inertia``. A fit that hardly
+    tells rotor and link apart is another reason for one.
     """
 
     kind = "load_dependent_friction"
@@ -51,6 +54,7 @@ class LoadDependentFriction(Effect):
         Shape("power", "1", (), 0.3, 3.0, scales=False),
         Shape("friction", "N m", (), 1e-9, np.inf, scales=False, has_interval=False),
         Shape("damping", "N m s/rad", (), 1e-9, np.inf, scales=False, has_interval=False),
+        Shape("inertia", "kg m^2", (), 1e-9, np.inf, scales=False, has_interval=False),
         Shape("threshold", "N m", (), 1e-9, np.inf, scales=False, has_interval=False),
     )
     forms = (
@@ -60,6 +64,8 @@ class LoadDependentFriction(Effect):
         {"viscous": 1.0},
         {"friction": 0.3, "damping": 0.1},
         {"driving": 1.0, "friction": 0.3, "damping": 0.1},
+        {"inertia": 0.1},
+        {"friction": 0.3, "damping": 0.1, "inertia": 0.1},
         {"threshold": 0.5},
         {"side": 1.0},
         {"side": -1.0},
@@ -79,13 +85,18 @@ class LoadDependentFriction(Effect):
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         assert signals.load is not None
         typical = float(np.sqrt(np.mean(signals.load[:, joints[0]] ** 2)))
-        speed = float(np.sqrt(np.mean(signals.dq[:, joints[0]] ** 2)))
+        speed, rate = (
+            max(float(np.sqrt(np.mean(signal[:, joints[0]] ** 2))), 1e-9)
+            for signal in (signals.dq, signals.ddq)
+        )
         reference = {"reference": typical} if typical > 0 else {}
         found: list[dict[str, Any]] = [{}]
         for form in map(dict, self.forms):
             if "friction" in form:
                 form["friction"] *= typical
-                form["damping"] *= typical / max(speed, 1e-9)
+                form["damping"] *= typical / speed
+            if "inertia" in form:
+                form["inertia"] *= typical / rate
             if "threshold" in form:
                 form["threshold"] *= typical
             found.append(form | (reference if "power" in form else {}))

@@ -58,3 +58,11 @@ def test_its_own_friction_needs_a_load_that_moves_the_joint(signals):
 
     assert effect.admissible(heavy, [0], shape) and effect.admissible(light, [0], {})
     assert not effect.admissible(light, [0], shape)
+
+
+def test_a_rotor_that_accelerates_loads_the_gear_with_its_inertia(signals):
+    effect = get_effect("load_dependent_friction")
+    columns = effect.columns(signals, 0, inertia=0.5)
+    load = signals.load[:, 0] + 0.5 * signals.ddq[:, 0]
+    np.testing.assert_allclose(columns[:, 0], np.abs(load) * signals.sign[:, 0])
+    assert any(set(shape) == {"inertia"} for shape in effect.grid(signals, (0,)))
