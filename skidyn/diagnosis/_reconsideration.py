@@ -108,12 +108,7 @@ class ReconsideringSearch(JudgingSearch):
             self.add(first)
             self.refit()
             self.sigma = self.weights()
-            known = sorted(self._greedy_by_kind(nameless=False), key=lambda item: item[1])
-            second = [
-                h
-                for h in self._finals([c for c, _ in known[: self.settings.refined]])
-                if set(best.joints) <= set(h.joints)
-            ]
+            second = [h for h in self._known_alone() if set(best.joints) <= set(h.joints)]
             errors = [h.errors.sum(0) for h in second if h.errors is not None]
             self._restore(kept)
             if any(self._good_enough(e, left, removed, best.joints) for e in errors):
@@ -184,16 +179,21 @@ class ReconsideringSearch(JudgingSearch):
     def _has_rival(self, old: Hypothesis) -> bool:
         """Whether another known kind, alone in the place of a finding, is nearly as good as it.
 
-        A fraction of the time of a whole competition, in which it then wins or loses.
+        Without one, no other kind can replace it, and :meth:`_competed_again`, which takes several
+        times as long, is not needed.
         """
         kept = self._state()
         self._take_out(old)
-        known = sorted(self._greedy_by_kind(nameless=False), key=lambda item: item[1])
-        others = [c for c, _ in known if c[0].kind != old.kind][: self.settings.refined]
         again = max((h.score for h in self._finals([list(old.candidates)])), default=0.0)
-        best = max((h.score for h in self._finals(others)), default=-np.inf)
+        best = max((h.score for h in self._known_alone(except_for=old.kind)), default=-np.inf)
         self._restore(kept)
         return bool(best > NEARLY * again)
+
+    def _known_alone(self, except_for: str = "") -> list[Hypothesis]:
+        """The best few known kinds, each alone and with refined shapes."""
+        known = sorted(self._greedy_by_kind(nameless=False), key=lambda item: item[1])
+        others = [own for own, _ in known if own[0].kind != except_for]
+        return self._finals(others[: self.settings.refined])
 
     def _score_without(self, best: Hypothesis) -> float:
         """Score of an explanation by the torque of a model that lacks what it replaces.

@@ -532,7 +532,9 @@ class Effect:
         units |= {s.name: s.unit for s in self.shapes}
         if not prismatic:
             return units
-        return {k: u.replace("N m", "N").replace("rad", "m") for k, u in units.items()}
+        for turning, sliding in (("kg m^2", "kg"), ("N m", "N"), ("rad", "m")):
+            units = {name: unit.replace(turning, sliding) for name, unit in units.items()}
+        return units
 
     def describe(self) -> dict[str, Any]:
         """All information printed in the catalogue, the report and the documentation.

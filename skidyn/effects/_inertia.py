@@ -26,6 +26,3 @@ class RotorInertia(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         return signals.ddq[:, [joint]]
-
-    def units(self, prismatic: bool = False) -> dict[str, str]:
-        return {"Ia": "kg" if prismatic else "kg m^2"}

@@ -96,25 +96,6 @@ class _Spline(NamelessEffect):
         return splines(x, shape["low"], shape["high"], self.n_splines)
 
 
-def _sliding(signals: Signals, joint: int, prefix: str = "") -> dict[str, float]:
-    """Middle and length in m of the range of a slider; nothing for a joint that turns."""
-    if not signals.prismatic[joint]:
-        return {}
-    low, high = supported_range(signals, signals.q[:, joint])
-    return {f"{prefix}middle": (low + high) / 2, f"{prefix}span": high - low} if high > low else {}
-
-
-def _angle(signals: Signals, joint: int, shape: Mapping[str, Any], prefix: str = "") -> Array:
-    """Position in rad, (n_samples,); a slider moves over its range in half a turn.
-
-    Few harmonics represent a smooth function of an angle. In a fixed unit of length, a slider with
-    a long way would turn round many times.
-    """
-    middle, span = shape.get(f"{prefix}middle", 0.0), shape.get(f"{prefix}span")
-    unit = float(signals.unit[joint]) if span is None else span / np.pi
-    return np.asarray((signals.q[:, joint] - middle) / unit)
-
-
 class FunctionOfPosition(_Spline):
     """A smooth function of the joint's own position."""
 
@@ -138,7 +119,39 @@ class FunctionOfVelocity(_Spline):
     signal, n_splines = "dq", 24
 
 
-class FrictionOverPosition(NamelessEffect):
+def _sliding(signals: Signals, joint: int, prefix: str = "") -> dict[str, float]:
+    """Middle and length in m of the range of a slider; nothing for a joint that turns."""
+    if not signals.prismatic[joint]:
+        return {}
+    low, high = supported_range(signals, signals.q[:, joint])
+    return {f"{prefix}middle": (low + high) / 2, f"{prefix}span": high - low} if high > low else {}
+
+
+def _angle(signals: Signals, joint: int, shape: Mapping[str, Any], prefix: str = "") -> Array:
+    """Position in rad, (n_samples,); a slider moves over its range in half a turn.
+
+    Few harmonics represent a smooth function of an angle. In a fixed unit of length, a slider with
+    a long way would turn round many times.
+    """
+    middle, span = shape.get(f"{prefix}middle", 0.0), shape.get(f"{prefix}span")
+    unit = float(signals.unit[joint]) if span is None else span / np.pi
+    return np.asarray((signals.q[:, joint] - middle) / unit)
+
+
+class _OverMotion(NamelessEffect):
+    """A function of few coefficients of the signals of a joint, or of it and each other joint."""
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        own = _sliding(signals, joints[0]) if "q_own" in self.depends_on else {}
+        if not any(signal.endswith("_other") for signal in self.depends_on):
+            return [dict(own)]
+        shapes = [own | shape for shape in self.others(signals, joints[0])]
+        if "q_other" not in self.depends_on:
+            return shapes
+        return [shape | _sliding(signals, shape["other"], "other_") for shape in shapes]
+
+
+class FrictionOverPosition(_OverMotion):
     """Friction that varies with the joint's own position."""
 
     kind = "friction_over_position"
@@ -148,8 +161,8 @@ class FrictionOverPosition(NamelessEffect):
     coefficients = unnamed_coefficients(6)
     depends_on = ("q_own", "dq_own")
 
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        return [dict(_sliding(signals, joints[0]))]
+    #: A joint that turns needs no range of its motion.
+    has_shape = False
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         x = _angle(signals, joint, shape)
@@ -199,7 +212,7 @@ class FunctionOfPositionAndVelocity(_Spline):
         return np.hstack([orders * m[:, None] for m in motion])
 
 
-class FunctionOfTwoPositions(NamelessEffect):
+class FunctionOfTwoPositions(_OverMotion):
     """A smooth torque that depends on two positions: a cable, a hose, a closed chain."""
 
     kind = "function_of_two_positions"
@@ -207,13 +220,6 @@ class FunctionOfTwoPositions(NamelessEffect):
     formula = r"f(q_j, q_k)"
     coefficients = unnamed_coefficients(7)
     depends_on = ("q_own", "q_other")
-
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        own = _sliding(signals, joints[0])
-        return [
-            shape | own | _sliding(signals, shape["other"], "other_")
-            for shape in self.others(signals, joints[0])
-        ]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         x = _angle(signals, joint, shape)
@@ -231,7 +237,7 @@ class FunctionOfTwoPositions(NamelessEffect):
         )
 
 
-class FrictionOverOtherPosition(NamelessEffect):
+class FrictionOverOtherPosition(_OverMotion):
     """Friction of one joint that varies with the position of another."""
 
     kind = "friction_over_other_position"
@@ -241,19 +247,13 @@ class FrictionOverOtherPosition(NamelessEffect):
     coefficients = unnamed_coefficients(4)
     depends_on = ("dq_own", "q_other")
 
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        return [
-            shape | _sliding(signals, shape["other"], "other_")
-            for shape in self.others(signals, joints[0])
-        ]
-
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         y = _angle(signals, int(shape["other"]), shape, "other_")
         motion = (signals.sign[:, joint], signals.dq[:, joint])
         return np.column_stack([wave * m for m in motion for wave in (np.cos(y), np.sin(y))])
 
 
-class FunctionOfTwoVelocities(NamelessEffect):
+class FunctionOfTwoVelocities(_OverMotion):
     """Drag of one joint that depends on the velocity of another."""
 
     kind = "function_of_two_velocities"
@@ -262,9 +262,6 @@ class FunctionOfTwoVelocities(NamelessEffect):
     formula = r"f(\dot q_j, \dot q_k)"
     coefficients = unnamed_coefficients(6)
     depends_on = ("dq_own", "dq_other")
-
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        return self.others(signals, joints[0])
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         k = int(shape["other"])

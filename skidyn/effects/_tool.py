@@ -250,6 +250,8 @@ class ExternalWrench(_ToolEffect):
 
 #: Power of the depth with which the force between round bodies grows (Hertz 1882).
 _HERTZ = 1.5
+#: Shape entries of a ball.
+_BALL = ("radius", "center_x", "center_y", "center_z")
 #: Number of places at which a ball is tried, their spread in standard deviations of the motion, and
 #: the share of the motion that its surface leaves inside.
 _PLACES, _SPREAD, _INSIDE = 20, 1.3, 0.22
@@ -259,10 +261,6 @@ _OBLIQUE = (
     *((np.pi * (k + 0.5) / 2, 0.0) for k in range(4)),
     *((np.pi * k / 2, np.pi / 3) for k in range(4)),
 )
-
-
-#: Entries of the shape of a ball.
-_BALL = ("radius", "center_x", "center_y", "center_z")
 
 
 class EnvironmentContact(Effect):
@@ -365,23 +363,18 @@ class EnvironmentContact(Effect):
         return told
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
-        return bool(FEWEST_TOUCHING < np.mean(_depth(signals, shape) > 0) < MOST_TOUCHING)
+        _, height = _surface(signals, shape)
+        return bool(FEWEST_TOUCHING < np.mean(height < 0) < MOST_TOUCHING)
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        position = tool_position(signals, shape)
-        if "radius" in shape:
-            return float(np.max(np.ptp(position, axis=0)))
-        return float(np.ptp(position @ _normal(shape)))
+        return float(np.ptp(_surface(signals, shape)[1]))
 
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
-        jacobian = tool_jacobian(signals, shape)
-        if "radius" in shape:
-            reach = np.einsum("ian,ia->in", jacobian, _outwards(signals, shape)[0])
-        else:
-            reach = np.einsum("ian,a->in", jacobian, _normal(shape))
-        pressure = _depth(signals, shape) ** shape.get("power", 1.0)
+        normal, height = _surface(signals, shape)
+        reach = np.einsum("ian,ia->in", tool_jacobian(signals, shape), normal)
+        pressure = np.maximum(0.0, -height) ** shape.get("power", 1.0)
         if "damping" in shape:
             approach = -np.sum(reach * signals.dq, axis=1)
             pressure = pressure * np.maximum(0.0, 1.0 + shape["damping"] * approach)
@@ -403,20 +396,32 @@ def _normal(shape: Mapping[str, Any]) -> Array:
     return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
 
-def _outwards(signals: Signals, shape: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Direction of the tool from the center of a ball, (n_samples, 3), and its distance in m."""
-    center = np.array([shape[name] for name in _BALL[1:]])
-    away = tool_position(signals, shape) - center
-    distance = np.sqrt(np.einsum("ia,ia->i", away, away))
-    return away / np.maximum(distance, np.finfo(float).tiny)[:, None], distance
+def _surface(signals: Signals, shape: Mapping[str, Any]) -> tuple[Array, Array]:
+    """Surface that the tool may touch.
 
+    Parameters
+    ----------
+    signals : Signals
+        Motion and robot.
+    shape : mapping
+        Shape of the contact, of a plane or a ball.
 
-def _depth(signals: Signals, shape: Mapping[str, Any]) -> Array:
-    """Depth of the tool in a surface in m, 0 outside, shape (n_samples,)."""
+    Returns
+    -------
+    normal : ndarray of shape (n_samples, 3)
+        Direction out of the surface at the tool, of unit length.
+    height : ndarray of shape (n_samples,), m
+        Distance of the tool from the surface, negative inside.
+    """
+    position = tool_position(signals, shape)
     if "radius" in shape:
-        return np.asarray(np.maximum(0.0, shape["radius"] - _outwards(signals, shape)[1]))
-    position, normal = tool_position(signals, shape), _normal(shape)
+        away = position - np.array([shape[name] for name in _BALL[1:]])
+        distance = np.sqrt(np.einsum("ia,ia->i", away, away))
+        normal = away / np.maximum(distance, np.finfo(float).tiny)[:, None]
+        return normal, distance - shape["radius"]
+    normal = _normal(shape)
     if "azimuth" in shape:
-        position = position - np.array([shape[axis] for axis in "xyz"])
-        return np.asarray(np.maximum(0.0, shape["z0"] - position @ normal))
-    return np.asarray(np.maximum(0.0, shape["side"] * shape["z0"] - position @ normal))
+        height = (position - np.array([shape[axis] for axis in "xyz"])) @ normal - shape["z0"]
+    else:
+        height = position @ normal - shape["side"] * shape["z0"]
+    return np.broadcast_to(normal, position.shape), height

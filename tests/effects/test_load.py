@@ -66,3 +66,4 @@ def test_a_rotor_that_accelerates_loads_the_gear_with_its_inertia(signals):
     load = signals.load[:, 0] + 0.5 * signals.ddq[:, 0]
     np.testing.assert_allclose(columns[:, 0], np.abs(load) * signals.sign[:, 0])
     assert any(set(shape) == {"inertia"} for shape in effect.grid(signals, (0,)))
+    assert (effect.units()["inertia"], effect.units(prismatic=True)["inertia"]) == ("kg m^2", "kg")

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from skidyn.effects import Term, get_effect
+from skidyn.effects import FrictionTransformer, Term, get_effect
 
 
 def test_a_push_during_motion_is_a_function_of_position_and_velocity(signals, left_by):
@@ -36,3 +36,9 @@ def test_friction_over_the_position_of_a_long_slider_is_smooth(signals, left_by)
     (shape,) = (s for s in effect.grid(slides, (0,)) if s["other"] == 1)
     columns = effect.torque_columns(slides, (0,), **shape)[0]
     assert left_by(np.column_stack([columns, slides.dq[:, 0]]), friction) < 0.05
+
+
+def test_friction_over_position_is_a_term_without_a_shape(signals):
+    transformer = FrictionTransformer(["friction_over_position"], n_joints=signals.n_joints)
+    X = np.hstack([signals.q, signals.dq, signals.ddq])
+    assert len(transformer.fit_transform(X)) == len(X)
