@@ -69,8 +69,10 @@ class CoupledFriction(_PairEffect):
     """Friction of a shaft that turns with the sum of two joint velocities.
 
     The viscous part may grow with another ``power`` of the speed (1 where the shape has none), in
-    units of 1 rad/s or 1 m/s. A ``differential`` has two such shafts, one that turns with the sum
-    and one with the difference of the velocities, with equal or ``unequal`` friction.
+    units of 1 rad/s or 1 m/s. The dry part may grow as the hyperbolic tangent of the speed divided
+    by a ``rounding``, as Coulomb friction may. A ``differential`` has two such shafts, one that
+    turns with the sum and one with the difference of the velocities, with equal or ``unequal``
+    friction.
     """
 
     kind = "coupled_friction"
@@ -78,10 +80,15 @@ class CoupledFriction(_PairEffect):
     title = "Coupled friction"
     formula = r"F_v\,\dot x + F_c\,\mathrm{sign}\,\dot x,\quad \dot x = \dot q_i + r\,\dot q_j"
     coefficients = (Coefficient("Fc", "N m", sign=1), Coefficient("Fv", "N m s/rad", sign=1))
-    shapes = (_RATIO, Shape("power", "1", (), 0.3, 3.0, scales=False))
+    shapes = (
+        _RATIO,
+        Shape("power", "1", (), 0.3, 3.0, scales=False),
+        Shape("rounding", "rad/s", (), 1e-3, 1.0, has_interval=False),
+    )
     forms = (
         {"power": 2.0},
         {"power": 0.5},
+        {"rounding": 0.2},
         {"differential": 1.0},
         {"differential": 1.0, "unequal": 1.0},
     )
@@ -95,7 +102,8 @@ class CoupledFriction(_PairEffect):
     ) -> Array:
         speed = signals.dq[:, i] + ratio * signals.dq[:, j]
         drag = np.sign(speed) * np.abs(speed) ** form.get("power", 1.0)
-        return np.column_stack([np.tanh(speed / (SIGN_BLUR * signals.unit[i])), drag])
+        rounding = form.get("rounding", SIGN_BLUR * signals.unit[i])
+        return np.column_stack([np.tanh(speed / rounding), drag])
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         unit = self.travel(signals, joints, {})

@@ -65,6 +65,7 @@ class LoadDependentFriction(Effect):
         {"friction": 0.3, "damping": 0.1},
         {"driving": 1.0, "friction": 0.3, "damping": 0.1},
         {"inertia": 0.1},
+        {"inertia": 3.0},  # of a wrist, whose rotor takes more torque than its link
         {"friction": 0.3, "damping": 0.1, "inertia": 0.1},
         {"threshold": 0.5},
         {"side": 1.0},

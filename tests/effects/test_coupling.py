@@ -64,6 +64,14 @@ def test_coupled_drag_may_grow_with_a_power_of_the_speed(signals):
     np.testing.assert_allclose(columns[0][:, 1], speed * np.abs(speed))
 
 
+def test_the_dry_part_of_coupled_friction_may_be_rounded(signals):
+    columns = get_effect("coupled_friction").torque_columns(
+        signals, (0, 1), ratio=-1.0, rounding=0.3
+    )
+    speed = signals.dq[:, 0] - signals.dq[:, 1]
+    np.testing.assert_allclose(columns[0], np.column_stack([np.tanh(speed / 0.3), speed]))
+
+
 def test_a_differential_has_a_shaft_for_the_sum_and_one_for_the_difference(signals):
     effect = get_effect("coupled_friction")
     both = effect.torque_columns(signals, (0, 1), ratio=1.0, differential=1.0)
