@@ -160,8 +160,8 @@ class ChoosingSearch(RankingSearch):
     def _named(self, ranking: list[Hypothesis]) -> Hypothesis:
         """The first explanation, or a more specific one with a sufficiently good formula.
 
-        A known effect is more specific than a function of signals, and an effect that is equal in
-        all recordings more than one with a separate size in each.
+        A known effect is more specific than a function of signals with at least as many parameters,
+        and an effect that is equal in all recordings more than one with a separate size in each.
         """
         best = ranking[0]
         single = within_recordings(best)
@@ -187,6 +187,8 @@ class ChoosingSearch(RankingSearch):
                 return rival  # the function does not add enough to be a finding in addition
             if not single and self.denied(rival, best):
                 continue
+            if not single and rival.n_parameters > best.n_parameters:
+                continue  # a law of fewer numbers that explains more is the more specific one
             errors = rival.errors
             if errors.shape != best.errors.shape:
                 errors = self._errors(rival, within=single)

@@ -386,8 +386,9 @@ class RankingSearch(SearchState):
             score = float(gain.sum()) - price * count
             if hypothesis.is_further_form:
                 score -= self.settings.least_gain
-            if kind == UNKNOWN:
-                # The held-out error includes the penalty for its coefficients already.
+            if kind == UNKNOWN and not in_part(hypothesis):
+                # The held-out error includes the penalty for its coefficients already, but not if
+                # other parts of the same few recordings are held out, which repeat their paths.
                 score = float(gain.sum()) - price * min(count, self.settings.nameless_price)
             ranking.append(Hypothesis(kind, tuple(candidates), gain, score, count, errors=after))
         return [h for h in ranking if h.score > self.settings.least_gain]

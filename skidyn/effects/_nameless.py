@@ -260,7 +260,7 @@ class FunctionOfTwoVelocities(_OverMotion):
     drawn_against = "dq"
     title = "Function of two velocities"
     formula = r"f(\dot q_j, \dot q_k)"
-    coefficients = unnamed_coefficients(6)
+    coefficients = unnamed_coefficients(7)
     depends_on = ("dq_own", "dq_other")
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
@@ -275,6 +275,7 @@ class FunctionOfTwoVelocities(_OverMotion):
                 np.abs(dq) * other_sign,
                 other,
                 other_sign,
+                other * np.abs(other),
             ]
         )
 

@@ -158,11 +158,12 @@ class UnexplainedTorque(Check):
             return  # rough derivatives, or another friction, are no other signal
         if not np.any(seen.errors[0] > UNRELATED):
             return
-        carried = seen.fits.loaded().identified(Reading()).scale[seen.joints] / seen.spread
+        loaded = seen.fits.loaded()
+        carried = loaded.identified(Reading()).scale[seen.joints] / seen.spread
         least = np.minimum(np.minimum(*seen.errors), carried)  # a load is no other signal
         steady = seen.scatter / np.sqrt(6)  # white noise is not an error of the log
         bad: NDArray[np.bool_] = (least > UNRELATED) & (least > BEYOND * steady)
-        held = _held_out(seen)
+        held = _held_out(loaded, seen.joints)
         bad |= (held > 1.0) & (seen.errors[0] > UNRELATED) & (held > BEYOND * steady)
         unlike = [k for k, found in zip(seen.joints, bad, strict=True) if found]
         joints = [k for k in unlike if _left_by_position(seen, k) > LEFT]
@@ -190,15 +191,19 @@ class UnexplainedTorque(Check):
             )
 
 
-def _held_out(seen: Explained) -> Array:
+def _held_out(fits: Fits, joints: list[int]) -> Array:
     """Errors of parts of a log predicted by bodies identified on the others, as shares of a torque.
 
-    The share is 1 if a constant, the median of the torque, would have the same error.
+    The share is 1 if a constant, the median of the torque, would have the same error. The load of a
+    recording is known from its other parts only.
     """
-    fits = seen.fits
     number = fits.recording
     if len(np.unique(number)) < FEWEST_PARTS:
         number = np.arange(fits.n_rows) * FEWEST_PARTS // fits.n_rows
+    elif fits.loads:
+        borders = np.flatnonzero(np.diff(number, prepend=number[0] - 1, append=number[-1] - 1))
+        lengths = np.diff(borders)
+        number = np.concatenate([np.arange(n) * FEWEST_PARTS // n for n in lengths])
     parts = [np.isin(number, own) for own in np.array_split(np.unique(number), FEWEST_PARTS)]
     left, whole = np.zeros((2, fits.n_joints))
     for out, predicted in zip(parts, fits.predicted_without(parts), strict=True):
@@ -206,7 +211,7 @@ def _held_out(seen: Explained) -> Array:
             y, use = fits.mean_torque(k)
             left[k] += np.sum((y[use & out] - torque) ** 2)
             whole[k] += np.sum((y[use & out] - np.median(y[use])) ** 2)
-    return np.sqrt(left / np.where(whole > 0, whole, np.inf))[seen.joints]
+    return np.sqrt(left / np.where(whole > 0, whole, np.inf))[joints]
 
 
 def _left_by_position(seen: Explained, k: int) -> float:

@@ -22,7 +22,7 @@ from skidyn._signals import Array
 from skidyn._text import trajectories_told
 from skidyn.measurement._bodies import explained
 from skidyn.measurement._check import Check
-from skidyn.measurement._duel import left_by_effects
+from skidyn.measurement._duel import gained_over_effects, left_by_effects
 from skidyn.measurement._fits import Fits, lines_between
 from skidyn.measurement._gains import CLEARLY, joint_gain
 from skidyn.measurement._measurement import Measurement
@@ -326,9 +326,13 @@ def _refined_zero(fits: Fits, tried: list[Tried]) -> Division | None:
     there = fixed.identified(Reading())
     worst = int(np.argmax(there.margin(here)))
     drop = 1 - float(_spread(there.residual[worst]) / _spread(here.residual[worst]))
-    if drop > DROP and _unlike_effects(fits, fixed, worst, np.isin(fits.recording, out)):
-        return Division("zero", k, tuple(map(int, out)), angle, value, drop)
-    return None
+    odd = np.isin(fits.recording, out)
+    if drop <= DROP or not _unlike_effects(fits, fixed, worst, odd):
+        return None
+    # a payload of half of many recordings is seen by all joints, and another zero by its own
+    if gained_over_effects(fits, fixed, worst, odd) <= 0:
+        return None
+    return Division("zero", k, tuple(map(int, out)), angle, value, drop)
 
 
 def _unlike_effects(

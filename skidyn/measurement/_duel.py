@@ -141,6 +141,29 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[fl
     return scaled[0], min(scaled), min(left)
 
 
+def gained_over_effects(fits: Fits, mended: Fits, joint: int, rows: NDArray[np.bool_]) -> float:
+    """Log-likelihood that a corrected log gains more than an effect in the same recordings does.
+
+    Parameters
+    ----------
+    fits, mended : Fits
+        Rows as they are, and with the correction.
+    joint : int
+        Joint, from 0, on which effects are tried.
+    rows : ndarray of shape (n_rows,) of bool
+        Rows of the recordings that are corrected.
+    """
+    reading = Reading()
+    inflation = fits.identified(reading).inflation
+    here, there = (
+        NearBodies(f, reading, np.nan_to_num(f.nominal(reading).gain), inflation)
+        for f in (fits, mended)
+    )
+    effects = _likely(here, [joint], rows)
+    rivals = [here.fit(columns).posterior - cost for _, columns, cost in effects]
+    return there.plain.posterior - max(rivals, default=here.plain.posterior)
+
+
 def _effects() -> Iterator[Effect]:
     """Effects of the catalogue that depend only on the present motion."""
     for kind in searched_kinds():

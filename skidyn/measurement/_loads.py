@@ -11,7 +11,7 @@ from skidyn._signals import Array
 #: Parameters of the last body of which a load consists, its mass and first moments, from the end.
 LOAD = np.arange(-10, -6)
 #: Most recordings that may carry loads of their own.
-MOST_RUNS = 8
+MOST_RUNS = 16
 
 
 def n_loads(number: NDArray[np.int64]) -> int:

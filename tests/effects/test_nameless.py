@@ -42,3 +42,10 @@ def test_friction_over_position_is_a_term_without_a_shape(signals):
     transformer = FrictionTransformer(["friction_over_position"], n_joints=signals.n_joints)
     X = np.hstack([signals.q, signals.dq, signals.ddq])
     assert len(transformer.fit_transform(X)) == len(X)
+
+
+def test_a_drag_of_another_joint_may_be_quadratic(signals, left_by):
+    """A hose that another joint drags through the air."""
+    wind = signals.dq[:, 1] * np.abs(signals.dq[:, 1])
+    effect = get_effect("function_of_two_velocities")
+    assert left_by(effect.torque_columns(signals, (0,), other=1)[0], wind) < 1e-9

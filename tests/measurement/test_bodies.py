@@ -6,9 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skidyn.datasets import (
-    make_hidden_effect_log,
-)
+from skidyn.datasets import load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 from skidyn.measurement import Measurement, check_measurement
 
@@ -18,6 +16,20 @@ def test_torque_of_something_else(recorded, told_of):
     wave = np.convolve(wave, np.hanning(80), "same")
     other = recorded.frame.assign(tau2=recorded.frame["tau2"].std() * wave / wave.std())
     assert told_of(other)["unexplained"].joints == (2,)
+
+
+def test_a_heavy_payload_in_half_of_many_recordings_is_no_mistake():
+    robot = load_ur5()
+    names = {name: [f"{name}{j + 1}" for j in range(6)] for name in ("q", "dq", "tau")}
+    options = {"n_trajectories": 10, "duration": 6.0, "random_state": 2}
+    frame = make_hidden_effect_log(robot, None, **options).frame
+    carried = frame["trajectory"].isin([1, 3, 4, 5, 8]).to_numpy()
+    q, dq = (frame[names[name]].to_numpy() for name in ("q", "dq"))
+    columns = robot.torque_regressor(q, dq, np.gradient(dq, 0.01, axis=0))[..., -10:]
+    body = [3.5, -0.1, 0.1, 0.28, 0.03, 0.0, 0.0, 0.03, 0.0, 0.01]  # 3.5 kg, 8 cm from the flange
+    frame.loc[carried, names["tau"]] += (columns @ body)[carried]
+    told = check_log(frame, robot).checks
+    assert not [s.suspicion for s in told if s.certainty != "noted"]
 
 
 def test_stated_bodies_concern_only_those_who_keep_them(arm, signals, torque):

@@ -8,7 +8,7 @@ from skidyn.logs import check_log
 from skidyn.measurement._loads import by_recording, n_loads, span
 
 
-@pytest.mark.parametrize("count, loads", [(1, 0), (2, 4), (5, 16), (9, 0)])
+@pytest.mark.parametrize("count, loads", [(1, 0), (2, 4), (5, 16), (16, 60), (17, 0)])
 def test_coefficients_of_loads_by_the_number_of_recordings(count, loads):
     number = np.repeat(np.arange(count), 3)
     assert n_loads(number) == loads
