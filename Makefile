@@ -36,6 +36,8 @@ export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
+# Many tests start a new Python, which would compile all that it imports again.
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: demo test slow lint check format docs wheel compatibility clean
 
