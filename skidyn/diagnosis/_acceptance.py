@@ -11,6 +11,7 @@ import numpy as np
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, rows_together
 from skidyn.diagnosis._choice import ChoosingSearch
+from skidyn.diagnosis._confidence import SEPARATES
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
@@ -372,30 +373,54 @@ class JudgingSearch(ChoosingSearch):
             for h in rivals
         )
 
-    def _elsewhere(self, best: Hypothesis) -> tuple[tuple[int, ...], ...]:
-        """Other pairs of joints on which a coupling explains equally much.
+    def on_neighbours(self, best: Hypothesis) -> Hypothesis:
+        """A coupling with the other pairs of joints on which it explains equally much.
 
         With parallel axes, the bodies compensate the difference between pairs, so that a small one
-        is no evidence.
+        is no evidence. Of pairs that the data cannot separate, one of neighbours is named, which a
+        transmission mostly couples.
         """
+        found = self._on_other_pairs(best)
+        pairs = [h.candidates[-1].joints for h in found]
+        if len(best.candidates) == 1 and found and not self._adjoin(best.candidates[0].joints):
+            most = SEPARATES * self._price(best.candidates)
+            for other in sorted(found, key=lambda h: -h.score):
+                (candidate,) = other.candidates
+                behind = float((best.gain - other.gain).sum())
+                near = behind < most and self._adjoin(candidate.joints)
+                if near and (judged := self.judged(other)) is not None:
+                    pairs[pairs.index(candidate.joints)] = best.candidates[0].joints
+                    return replace(judged, elsewhere=tuple(pairs))
+        return replace(best, elsewhere=tuple(pairs))
+
+    def _on_other_pairs(self, best: Hypothesis) -> list[Hypothesis]:
+        """A coupling on other pairs that share a joint with its own, as far as they are as good."""
         close = max(self.settings.least_gain, (1 - NEARLY) * best.score)
         pairs = [c for c in best.candidates if len(c.joints) == 2]
         if best.kind == UNKNOWN or within_recordings(best) or not pairs:
-            return ()
+            return []
         sites = {c.joints for c in best.candidates}
         others = self.strongest(
             lambda c: c.joints, lambda c: c.kind == best.kind and c.joints not in sites
         )
-        found: list[tuple[int, ...]] = []
+        found: list[Hypothesis] = []
         for own in pairs:
             rest = [c for c in best.candidates if c is not own]
             near = [others[joints] for joints in sorted(others) if set(joints) & set(own.joints)]
             found += [
-                h.candidates[-1].joints
+                h
                 for h in self._finals([[*rest, other] for other in near], refined=len(near))
                 if best.score - h.score < close
             ]
-        return tuple(found)
+        return found
+
+    def _adjoin(self, joints: Sequence[int]) -> bool:
+        """Whether one of two joints, from 0, carries the other."""
+        i, j = sorted(joints)
+        robot = self.problem.robot
+        if robot is None or robot.tree.n_bodies != self.problem.n_joints:
+            return j - i == 1  # bodies that follow others have no joints of their own
+        return int(robot.tree.parents[j]) == i
 
 
 def _share_of_error(tester: Tester, candidate: Candidate) -> float:

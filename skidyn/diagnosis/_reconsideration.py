@@ -62,9 +62,8 @@ class ReconsideringSearch(JudgingSearch):
                 replaced = best.kind if simpler is not None and simpler.kind != best.kind else ""
                 rivals = rivals_among(judged, [h for h in offered if h.kind != replaced])
                 margin, alike = margin_over(judged, rivals), self._alike(judged, rivals)
-                elsewhere = self._elsewhere(judged)
-                judged = replace(judged, margin=margin, alike=alike, elsewhere=elsewhere)
-                return ranked_with(judged, offered)
+                judged = self.on_neighbours(judged)
+                return ranked_with(replace(judged, margin=margin, alike=alike), offered)
         return None
 
     def _offset_later(self, step: Hypothesis) -> Hypothesis:

@@ -17,8 +17,9 @@ from skidyn.effects._springs import stiffens
 _RATIO = Shape(
     "ratio", "1", (1.0, -1.0), -np.inf, np.inf, spacing="linear", scales=False, has_interval=False
 )
-#: Largest ratio, in units of the two joints: beyond it an effect of the second joint alone fits.
-#: Between a slider and a rotary joint, a screw for example, the unit itself is only a guess.
+#: Largest ratio, in units of the two joints: beyond it an effect of the second joint alone fits,
+#: and below its inverse one that the first joint does not feel. Between a slider and a joint that
+#: turns, a screw for example, the unit itself is only a guess.
 LARGEST_RATIO, GUESSED = 10.0, (0.1, 1.0, 10.0)
 #: Further ratios of common gears, of which friction is tried: its sign depends on them.
 GEARS = (0.5, 2.0)
@@ -52,7 +53,8 @@ class _PairEffect(Effect):
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         largest = LARGEST_RATIO * (GUESSED[-1] if _differ(signals, joints) else 1.0)
-        return bool(abs(shape["ratio"]) <= largest * self.travel(signals, joints, shape))
+        ratio = abs(shape["ratio"]) / self.travel(signals, joints, shape)
+        return bool(1 / largest <= ratio <= largest)
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
         i, j = joints

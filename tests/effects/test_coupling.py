@@ -106,6 +106,16 @@ def test_coupled_friction_is_tried_with_ratios_of_common_gears(signals):
     assert all(shape["ratio"] > 0 for shape in grid if "differential" in shape)
 
 
+@pytest.mark.parametrize("kind", ["coupled_friction", "coupled_inertia", "coupling_spring"])
+def test_a_ratio_with_which_one_joint_feels_nothing_is_no_coupling(signals, kind):
+    allowed = [
+        ratio
+        for ratio in (0.01, 0.05, 0.2, 1.0, 5.0, 20.0)
+        if get_effect(kind).admissible(signals, (0, 1), {"ratio": -ratio})
+    ]
+    assert allowed == [0.2, 1.0, 5.0]
+
+
 def test_a_cable_between_two_joints_only_pulls(signals):
     effect, x = get_effect("coupling_spring"), signals.q[:, 0] + 0.5 * signals.q[:, 1] - 0.1
     for side in (1.0, -1.0):
