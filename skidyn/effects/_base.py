@@ -391,13 +391,16 @@ class Effect:
             axes.append([value * unit for value in shape.grid])
         names = [shape.name for shape in plain]
         shapes = [dict(zip(names, values, strict=True)) for values in itertools.product(*axes)]
+        return [shape | form for form in self._plain_and_forms(signals, joints) for shape in shapes]
+
+    def _plain_and_forms(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        """What the plain formula and each further form add to a shape, in units of the joint."""
         scaled = {shape.name for shape in self.shapes if shape.scales}
         unit = float(signals.unit[joints[0]])
-        forms = [
+        return [
             {name: x * unit if name in scaled else x for name, x in form.items()}
             for form in ({}, *self.forms)
         ]
-        return [shape | form for form in forms for shape in shapes]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         """Whether this data can distinguish the effect with this shape from a simpler one.

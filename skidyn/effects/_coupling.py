@@ -49,7 +49,7 @@ class _PairEffect(Effect):
         unit = self.travel(signals, joints, {})
         scales = GUESSED if _differ(signals, joints) else (1.0,)
         ratios = [{"ratio": sign * scale * unit} for scale in scales for sign in _RATIO.grid]
-        return [ratio | dict(form) for form in ({}, *self.forms) for ratio in ratios]
+        return [ratio | form for form in self._plain_and_forms(signals, joints) for ratio in ratios]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         largest = LARGEST_RATIO * (GUESSED[-1] if _differ(signals, joints) else 1.0)
@@ -204,14 +204,11 @@ class CouplingSpring(_PairEffect):
     reference = "Tsai (1999), Robot Analysis, Wiley, chapter 7."
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        i, j = joints
         shapes = super().grid(signals, joints)
         for shape in shapes:
             if "x0" in shape:
                 x = self._stretch(signals, joints, {"ratio": shape["ratio"]})
                 shape["x0"] = float(x.min() + x.max()) / 2
-            for name in {"stiffening", "softening"} & set(shape):
-                shape[name] *= float(signals.unit[i])
         # with a guessed ratio, the coordinate may be far larger than the unit of its joint
         return [shape for shape in shapes if self._finite(signals, joints, shape)]
 

@@ -152,6 +152,11 @@ def gained_over_effects(fits: Fits, mended: Fits, joint: int, rows: NDArray[np.b
         Joint, from 0, on which effects are tried.
     rows : ndarray of shape (n_rows,) of bool
         Rows of the recordings that are corrected.
+
+    Returns
+    -------
+    float
+        Negative if an effect is likelier. Bodies may differ from those of the description in both.
     """
     reading = Reading()
     inflation = fits.identified(reading).inflation

@@ -72,6 +72,17 @@ def test_the_dry_part_of_coupled_friction_may_be_rounded(signals):
     np.testing.assert_allclose(columns[0], np.column_stack([np.tanh(speed / 0.3), speed]))
 
 
+def test_further_forms_of_sliders_begin_in_their_units(signals):
+    slides = signals.with_(prismatic=np.ones(signals.n_joints, dtype=bool))
+    unit = float(slides.unit[0])
+    for kind, name, value in (
+        ("coupled_friction", "rounding", 0.2),
+        ("coupling_spring", "stiffening", 0.4),
+    ):
+        (start,) = {s[name] for s in get_effect(kind).grid(slides, (0, 1)) if name in s}
+        assert start == pytest.approx(value * unit) and unit != 1
+
+
 def test_a_differential_has_a_shaft_for_the_sum_and_one_for_the_difference(signals):
     effect = get_effect("coupled_friction")
     both = effect.torque_columns(signals, (0, 1), ratio=1.0, differential=1.0)
