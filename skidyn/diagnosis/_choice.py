@@ -20,7 +20,7 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._ranking import RankingSearch
-from skidyn.diagnosis._rule import NEARER, STANDS_OUT
+from skidyn.diagnosis._rule import FRICTION_SHARE, NEARER, STANDS_OUT
 from skidyn.effects import NamelessEffect, get_effect
 from skidyn.evidence import weighted_least_squares
 
@@ -71,7 +71,30 @@ class ChoosingSearch(RankingSearch):
                 simpler = simplicity_of(rival) < get_effect(part.kind).simplicity
                 if simpler and self._as_good(own, errors, part):
                     best = rival
-        return self._nearest_to_description(self._simplest_of_family(best, ranking), ranking)
+        best = self._nearest_to_description(self._simplest_of_family(best, ranking), ranking)
+        return self._plain_friction_first(best, ranking)
+
+    @staticmethod
+    def _plain_friction_first(best: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
+        """Plain friction that the model lacks, before what may only resemble it.
+
+        Every joint has viscous and Coulomb friction. Where the model has neither, a power of the
+        velocity explains more than each of them alone.
+        """
+        if best.kind == UNKNOWN or get_effect(best.kind).is_exact or within_recordings(best):
+            return best
+        plain = [
+            h
+            for h in ranking
+            if h.kind != UNKNOWN
+            and not within_recordings(h)
+            and not h.is_further_form
+            and get_effect(h.kind).is_exact
+            and get_effect(h.kind).drawn_against == "dq"
+            and set(h.joints) & set(best.joints)
+            and h.score > FRICTION_SHARE * best.score
+        ]
+        return max(plain, key=lambda h: h.score, default=best)
 
     def _nearest_to_description(
         self, best: Hypothesis, ranking: Sequence[Hypothesis]

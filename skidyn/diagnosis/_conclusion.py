@@ -27,7 +27,6 @@ from skidyn.diagnosis._findings import (
     Finding,
     effect_curves,
     make_finding,
-    rivals_of,
 )
 from skidyn.diagnosis._floor import predictable_share
 from skidyn.diagnosis._held_out import held_out_residual
@@ -147,7 +146,6 @@ def conclude(
     if not is_physics(model):
         shown, remark = _refitted(problem, result, model, data, shown)
         remarks.append(remark)
-    rivals = {h.kind: rivals_of(h) for h in result.findings}
     unknowns = _unknowns(problem, result, terms)
     unlisted = slight(problem, result.findings, intervals)
     remarks += unlisted.values()
@@ -155,13 +153,12 @@ def conclude(
     for i, hypothesis in enumerate(result.findings):
         if i in unlisted:
             continue
-        others = rivals.get(hypothesis.kind, ())
         for candidate, chance in zip(hypothesis.candidates, hypothesis.chances, strict=True):
             drop = drop_of(shown[i], shown[i + 1], tuple(candidate.rows))
             joints = [j + 1 for j in candidate.joints]
             own = [u for u in unknowns if hypothesis.kind == UNKNOWN and u.joint in joints]
             q = false_discovery_rate(chance, hypothesis.tried)
-            finding = make_finding(problem, hypothesis, candidate, others, q, drop, intervals, own)
+            finding = make_finding(problem, hypothesis, candidate, q, drop, intervals, own)
             finding.when.extend(acting(problem, candidate.term, own_torque))
             curves = effect_curves(problem, finding.terms, own_torque, residual)
             finding.curves.extend(curves)
@@ -187,15 +184,11 @@ def conclude(
         findings.append(wandering_torque(wandering))
     ends = np.array(history[0]["rmse"]), rmse
     whole = problem.whole_trajectories
-    scores = {h.kind: h.score for h in result.findings}
     changed = changes(problem, result)
     for i, finding in enumerate(findings):
         change = changed.get(finding.kind, Change())
         findings[i] = replace(finding, change=change.share, instead=change.instead)
-    findings = [
-        _sure(f, findings, parts, ends, whole, f.margin * scores.get(f.kind, np.inf))
-        for f in findings
-    ]
+    findings = [_sure(f, findings, parts, ends, whole) for f in findings]
     diagnosis = Diagnosis(
         _verdict(findings, parts),
         robot.joint_names,
@@ -362,7 +355,6 @@ def _sure(
     parts: Remainder,
     errors: tuple[Array, Array],
     whole: bool,
-    lead: float,
 ) -> Finding:
     """The finding with the probability that it is identified correctly."""
     if not finding.terms:
@@ -381,7 +373,7 @@ def _sure(
         float(parts.inflation[joints].max()),
         max(f.error_drop for f in findings if f.kind == finding.kind),
         q_value=min(f.q_value or 0.0 for f in findings if f.kind == finding.kind),
-        lead=lead,
+        lead=finding.lead,
         nameless=finding.kind != UNKNOWN and (beside or bool(parts.material[joints].any())),
         whole_recordings=whole,
         alike=finding.alike,

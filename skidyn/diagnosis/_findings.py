@@ -13,7 +13,13 @@ from skidyn._signals import Array
 from skidyn._text import inside, interval_told, joints_told, listed, trajectories_told
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._episodes import Episode
-from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, removed_share, rivals_among
+from skidyn.diagnosis._hypothesis import (
+    UNKNOWN,
+    Hypothesis,
+    least_sure,
+    removed_share,
+    rivals_among,
+)
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import NamelessEffect, Term, get_effect
 from skidyn.evidence import Problem
@@ -86,6 +92,8 @@ class Finding:
         ``{"kind", "share"}`` of the known effect that comes closest to an unknown torque, and the
         share of the error removed by the unknown torque that it removes alone; None if that is
         less than half.
+    lead : float
+        The margin as twice a log-likelihood.
 
     Examples
     --------
@@ -116,6 +124,7 @@ class Finding:
     change: float = 0.0
     instead: str | None = None
     nearest: dict[str, Any] | None = None
+    lead: float = np.inf
 
     def _repr_html_(self) -> str:
         from skidyn.diagnosis._notebook import finding_card
@@ -195,7 +204,6 @@ def make_finding(
     problem: Problem,
     hypothesis: Hypothesis,
     candidate: Candidate,
-    rivals: tuple[str, ...],
     q_value: float,
     error_drop: float,
     intervals: dict[Term, dict[str, Any]],
@@ -211,8 +219,6 @@ def make_finding(
         The added hypothesis.
     candidate : Candidate
         One of its terms.
-    rivals : tuple of str
-        Kinds that explain nearly as much.
     q_value, error_drop : float
         Significance and share of the squared error removed.
     intervals : dict
@@ -222,6 +228,8 @@ def make_finding(
     """
     term = candidate.term
     effect, unknown = term.effect, hypothesis.kind == UNKNOWN
+    compared = least_sure(hypothesis, candidate.joints)
+    rivals = tuple(dict.fromkeys([*rivals_of(hypothesis), *rivals_of(compared)]))
     joints = _joints(problem, hypothesis, candidate)
     parameters = {} if unknown else _parameters(problem, candidate, intervals)
     tested = tuple(sorted({v for u in unknowns for v in u.variables}))
@@ -277,12 +285,13 @@ def make_finding(
         sentence,
         code,
         (term,),
-        hypothesis.margin,
+        compared.margin,
         None,
         term.trajectories,
         alike=hypothesis.alike,
         elsewhere=elsewhere,
         nearest=nearest,
+        lead=compared.margin * compared.score,
     )
 
 

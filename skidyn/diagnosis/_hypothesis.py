@@ -51,6 +51,8 @@ class Hypothesis:
         Torque to be subtracted at the full rate (ripple).
     others : tuple of Hypothesis
         Explanations of other kinds in its ranking when it was added, best first.
+    alone : tuple of Hypothesis
+        Those of its terms that have rivals on their own joint, each compared with these.
     """
 
     kind: str
@@ -66,6 +68,7 @@ class Hypothesis:
     errors: Array | None = None
     torque: Array | None = None
     others: tuple[Hypothesis, ...] = ()
+    alone: tuple[Hypothesis, ...] = ()
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -115,6 +118,12 @@ class SearchResult:
 def ranked_with(best: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
     """The explanation that is added, with those of other kinds in its ranking."""
     return replace(best, others=tuple(h for h in ranking if h.kind != best.kind))
+
+
+def least_sure(best: Hypothesis, joints: Sequence[int]) -> Hypothesis:
+    """The explanation itself, or its term on some joints if this has a smaller margin alone."""
+    alone = [h for h in best.alone if set(h.joints) <= set(joints)]
+    return min([best, *alone], key=lambda h: h.margin)
 
 
 def close_shapes(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
@@ -224,7 +233,8 @@ def simplicity_of(hypothesis: Hypothesis) -> int:
     if hypothesis.kind == UNKNOWN:
         return 100
     ranks = [c.term.effect.simplicity_of(c.term.shape) for c in hypothesis.candidates]
-    return max(ranks) + 50 * hypothesis.is_further_form
+    changes = any(c.term.course for c in hypothesis.candidates)
+    return max(ranks) + 50 * (hypothesis.is_further_form or changes)
 
 
 def uses_the_fit(candidate: Candidate) -> bool:

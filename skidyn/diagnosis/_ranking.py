@@ -119,7 +119,7 @@ class RankingSearch(SearchState):
             if not wanted(candidate):
                 continue
             key = group(candidate)
-            if key not in best or self._drops[i] > self._drops[best[key]]:
+            if key not in best or self.drops[i] > self.drops[best[key]]:
                 best[key] = i
         return {key: self.pool[i] for key, i in best.items()}
 
@@ -150,7 +150,7 @@ class RankingSearch(SearchState):
         kinds = np.array([c.kind for c in self.pool])
         within = np.array([self.is_judged_within(c) for c in self.pool], dtype=bool)
         tester = self.tester(self.chosen)
-        self._drops = np.full(len(self.pool), -np.inf)
+        self.drops = np.full(len(self.pool), -np.inf)
         looks: list[Callable[[], _Greedy]] = []
         for wanted, inside in ((~within, False), (within, True)):
             if not wanted.any():
@@ -158,7 +158,7 @@ class RankingSearch(SearchState):
             screen = Screen(self.problem, self.sigma, self.pool, self.target, within=inside)
             base = screen.model(self.blocks)
             first = screen.step(base, wanted)
-            self._drops[wanted] = base.errors.sum() - first[wanted].sum(1)
+            self.drops[wanted] = base.errors.sum() - first[wanted].sum(1)
             looks += [
                 partial(self._greedy, screen, wanted & (kinds == kind), base, first, tester)
                 for kind in dict.fromkeys(kinds[wanted])

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn.diagnosis._acceptance import JudgingSearch
 from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._duels import DuellingSearch
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
@@ -27,7 +27,7 @@ from skidyn.diagnosis._rule import BETWEEN, NEARLY
 from skidyn.effects import Term, get_effect
 
 
-class ReconsideringSearch(JudgingSearch):
+class ReconsideringSearch(DuellingSearch):
     """A search that judges findings together."""
 
     def accepted(self, ranking: list[Hypothesis]) -> Hypothesis | None:
@@ -62,7 +62,7 @@ class ReconsideringSearch(JudgingSearch):
                 replaced = best.kind if simpler is not None and simpler.kind != best.kind else ""
                 rivals = rivals_among(judged, [h for h in offered if h.kind != replaced])
                 margin, alike = margin_over(judged, rivals), self._alike(judged, rivals)
-                judged = self.on_neighbours(judged)
+                judged = self.on_neighbours(self.on_each_joint(judged))
                 return ranked_with(replace(judged, margin=margin, alike=alike), offered)
         return None
 

@@ -90,6 +90,9 @@ BEYOND_FORMULAS = 0.5
 #: Of explanations that the data cannot separate, one is preferred with which the torque of the
 #: identified bodies differs from that of the described ones by less than this share of the others.
 NEARER = 0.5
+#: Viscous or Coulomb friction that the model lacks is added before another effect on its joints if
+#: it explains more than this share of what that explains (``_choice.py``).
+FRICTION_SHARE = 0.5
 #: A plain formula is not as good as a further form of another effect if it leaves more than this
 #: multiple of the squared error: where an effect is much larger than the noise, what its imperfect
 #: formula may leave is, too.
@@ -98,6 +101,9 @@ STANDS_OUT = 4.0
 #: of a coupling is told with the best one, and another kind may replace a finding beside a later
 #: one (``_ranking.py``, ``_acceptance.py``, ``_reconsideration.py``).
 NEARLY = 0.9
+#: Share of what an effect removes alone on a joint, on the grid of its shapes, from which another
+#: one is compared with it there (``_duels.py``).
+COMPARABLE = 0.8
 #: Share of a recording within which a change at its beginning or end lies between two recordings.
 BETWEEN = 0.02
 #: Share of an effect in one fold above which the others do not determine it: then parts of

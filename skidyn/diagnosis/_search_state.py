@@ -42,6 +42,7 @@ class Kept(NamedTuple):
     sigma: Array
     left: Array
     start: Array
+    drops: Array
 
 
 class SearchState:
@@ -76,7 +77,7 @@ class SearchState:
         self._last = LastResults()
         self.start = self.left = np.zeros(problem.n_joints)
         #: Held-out gain of each candidate of the pool, from the last screening.
-        self._drops = np.zeros(0)
+        self.drops = np.zeros(0)
         self._reconsidering = False
         self._within: dict[Term, bool] = {}
 
@@ -142,6 +143,7 @@ class SearchState:
             self.sigma,
             self.left,
             self.start,
+            self.drops,
         )
 
     def _restore(self, kept: Kept) -> None:

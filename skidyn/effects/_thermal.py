@@ -24,11 +24,14 @@ _SHOWN = 0.02
 _FASTER = 4.0
 
 
-def _warmth(signals: Signals, joint: int, levels_over: float = np.inf) -> Array:
+def _warmth(signals: Signals, joint: int, shape: Mapping[str, Any]) -> Array:
     """Temperature above the reference in K; a saturating function has its slope there."""
     assert signals.temperature is not None
-    warm = signals.temperature[:, joint] - REFERENCE_TEMPERATURE
-    return -levels_over * np.expm1(-warm / levels_over) if np.isfinite(levels_over) else warm
+    warm: Array = signals.temperature[:, joint] - REFERENCE_TEMPERATURE
+    if "levels_over" not in shape:
+        return warm
+    over = shape["levels_over"]
+    return np.asarray(-over * np.expm1(-warm / over))
 
 
 def _lasts(signals: Signals, since: float) -> bool:
@@ -50,13 +53,21 @@ def _risen(times: Array) -> Array:
 
 
 class _OverTemperature(Effect):
-    """An effect that changes with a logged temperature, and may level off exponentially."""
+    """An effect that changes with a logged temperature.
+
+    It changes linearly, with ``curved`` in its shape quadratically, or it levels off exponentially.
+    """
 
     drawn_against = "temperature"
     needs = ("temperature",)
     shapes = (Shape("levels_over", "K", (), 1.5, 60.0, scales=False, has_interval=False),)
-    forms = ({"levels_over": 6.0}, {"levels_over": 15.0})
+    forms = ({"levels_over": 6.0}, {"levels_over": 15.0}, {"curved": 1.0})
     reference = _BITTENCOURT
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        # A parabola is undetermined beyond the temperatures of the data, a line is not.
+        curved = "curved" in shape
+        return tuple(c for c in self.coefficients if curved or not c.name.startswith("d2"))
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         constant = None
@@ -85,9 +96,9 @@ class TemperatureFriction(_OverTemperature):
     separating_motion = "the same sweep on the cold and on the warm robot"
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        warm = _warmth(signals, joint, **shape)
-        dq = signals.dq[:, joint]
-        return np.column_stack([warm * dq, warm * signals.sign[:, joint], warm**2 * dq])
+        warm, dq = _warmth(signals, joint, shape), signals.dq[:, joint]
+        further = [warm**2 * dq] if "curved" in shape else []
+        return np.column_stack([warm * dq, warm * signals.sign[:, joint], *further])
 
 
 class TemperatureOffset(_OverTemperature):
@@ -106,18 +117,20 @@ class TemperatureOffset(_OverTemperature):
     separating_motion = "one pose held or one sweep repeated while the robot warms up"
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        warm = _warmth(signals, joint, **shape)
-        return np.column_stack([warm, warm**2, np.ones(signals.n_samples)])
+        warm = _warmth(signals, joint, shape)
+        further = [warm**2] if "curved" in shape else []
+        return np.column_stack([warm, *further, np.ones(signals.n_samples)])
 
 
 class FrictionDrift(Effect):
     """Friction that changes slowly over the log if no temperature is logged.
 
-    A gear warms up quickly at first and then ever more slowly, its inside before its housing: a
-    warm-up approaches its end with a time constant, another one four times as fast. The first two
-    coefficients are the change from the start of the log to its end. They are the only ones for
-    friction that changed at once, as after a repair or when a seal slips; its shape contains the
-    time ``since`` which it has changed, or ``level`` if it has another level in some recordings.
+    A gear warms up quickly at first and then ever more slowly: a warm-up approaches its end with a
+    time constant, and with ``two_rates`` in its shape also four times as fast, as if the inside of
+    the gear were warm before its housing. The first two coefficients are the change from the start
+    of the log to its end. Friction that changed at once, as after a repair or when a seal slips,
+    has in its shape the time ``since`` which it has changed, or ``level`` if it has another level
+    in some recordings.
     """
 
     kind = "friction_drift"
@@ -141,7 +154,7 @@ class FrictionDrift(Effect):
             "since", "s", (), -np.inf, np.inf, spacing="samples", scales=False, has_interval=False
         ),
     )
-    forms = ({"since": 0.0},)
+    forms = ({"since": 0.0}, {"two_rates": 1.0})
     needs = ("time",)
     simplicity = 31
     rivals = ("temperature_friction",)
@@ -157,6 +170,7 @@ class FrictionDrift(Effect):
         constants = np.clip(span * np.array(shape.grid), shape.low, shape.high)
         start = float(clock.min())
         gradual = [{"time_constant": float(c), "t0": start, "span": span} for c in constants]
+        gradual += [{**warm_up, "two_rates": 1.0} for warm_up in gradual]
         return gradual + [{"since": t} for t in moments(signals, _CHANGES) if _lasts(signals, t)]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
@@ -168,8 +182,7 @@ class FrictionDrift(Effect):
         return 0 if "level" in shape else self.simplicity
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
-        at_once = {"since", "level"} & set(shape)
-        return self.coefficients[:2] if at_once else self.coefficients
+        return self.coefficients if "two_rates" in shape else self.coefficients[:2]
 
     def meaning(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         if "since" not in parameters:
@@ -186,8 +199,8 @@ class FrictionDrift(Effect):
             return np.column_stack([later * dq, later * sign])
         since, span, slow = signals.clock - shape["t0"], shape["span"], shape["time_constant"]
         x, y = (_risen(since / t) / _risen(span / t) for t in (slow, slow / _FASTER))
-        bent = y - x
-        return np.column_stack([x * dq, x * sign, bent * dq, bent * sign])
+        further = [(y - x) * dq, (y - x) * sign] if "two_rates" in shape else []
+        return np.column_stack([x * dq, x * sign, *further])
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         if signals.temperature is not None:

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An effect on several joints, compared with other effects on each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+
+from skidyn.diagnosis._acceptance import JudgingSearch
+from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._hypothesis import (
+    UNKNOWN,
+    Hypothesis,
+    margin_over,
+    ranked_with,
+    rivals_among,
+    within_recordings,
+)
+from skidyn.diagnosis._rule import COMPARABLE
+from skidyn.effects import get_effect
+
+
+class DuellingSearch(JudgingSearch):
+    """A search that compares effects by joint."""
+
+    def on_each_joint(self, best: Hypothesis) -> Hypothesis:
+        """An effect on several joints, without those on which another effect is preferred.
+
+        One effect on all joints explains more than another one on each, so that it may also be
+        chosen for a joint on which it only resembles the right one. There, the rule for the choice
+        is applied to this joint alone. Joints of one robot have the same design: another effect
+        that is not exact must explain more than the common one.
+
+        Parameters
+        ----------
+        best : Hypothesis
+            Known effect that was judged.
+
+        Returns
+        -------
+        Hypothesis
+            The effect on at least one of its joints, with what its terms were compared with.
+        """
+        if len(best.candidates) < 2 or within_recordings(best) or not self._on_single_joints(best):
+            return best
+        kept, alone = [], []
+        for candidate in best.candidates:
+            with self._beside_the_others(best, candidate):
+                ranking = self._rivals_alone(best.kind, candidate)
+                other = self.pick(ranking)
+            own = next((h for h in ranking if h.kind == best.kind), None)
+            if own is None or other is None:
+                kept.append(candidate)
+                continue
+            more = (1 - self.settings.simpler_share) * other.score > own.score
+            if other.kind == best.kind or not (get_effect(other.kind).is_exact or more):
+                kept.append(candidate)
+                margin = margin_over(own, rivals_among(own, ranking))
+                alone.append(ranked_with(replace(own, margin=margin), ranking))
+        if 0 < len(kept) < len(best.candidates):
+            best = self._of_terms(best, kept)
+        return replace(best, alone=tuple(alone))
+
+    def _of_terms(self, best: Hypothesis, kept: Sequence[Candidate]) -> Hypothesis:
+        """Some terms of an explanation, with their own score."""
+        pairs = zip(best.candidates, best.chances, strict=True)
+        chances = tuple(chance for c, chance in pairs if c in kept)
+        best = replace(best, candidates=tuple(kept), chances=chances)
+        for found in self._finals([list(kept)], refined=0):
+            best = replace(
+                best,
+                gain=found.gain,
+                score=found.score,
+                n_parameters=found.n_parameters,
+                errors=found.errors,
+            )
+        return best
+
+    @contextmanager
+    def _beside_the_others(self, best: Hypothesis, candidate: Candidate) -> Iterator[None]:
+        """The present model with the other terms of an explanation."""
+        chosen = self.chosen
+        self.chosen = [*chosen, *(c for c in best.candidates if c is not candidate)]
+        try:
+            yield
+        finally:
+            self.chosen = chosen
+
+    @staticmethod
+    def _on_single_joints(best: Hypothesis) -> bool:
+        """Whether its terms are columns of single joints."""
+        known = best.kind != UNKNOWN and best.torque is None
+        return known and all(c.term.effect.scope == "joint" for c in best.candidates)
+
+    def _rivals_alone(self, kind: str, candidate: Candidate) -> list[Hypothesis]:
+        """A term and other known effects on its joint, best first; empty without others."""
+        found = self.strongest(
+            lambda c: c.kind, lambda c: c.joints == candidate.joints and c.kind != UNKNOWN
+        )
+        drops = {id(c): drop for c, drop in zip(self.pool, self.drops, strict=True)}
+        least = COMPARABLE * drops[id(found.pop(kind))] if kind in found else np.inf
+        near = [c for c in found.values() if drops[id(c)] > least]
+        near = sorted(near, key=lambda c: -drops[id(c)])[: self.settings.refined]
+        if not near:
+            return []
+        ranking = self._finals([[c] for c in (candidate, *near)], refined=len(near) + 1)
+        return sorted(ranking, key=lambda h: -h.score)
