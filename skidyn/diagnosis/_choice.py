@@ -16,6 +16,7 @@ from skidyn.diagnosis._hypothesis import (
     Hypothesis,
     family_of,
     in_part,
+    removed_share,
     simplicity_of,
     within_recordings,
 )
@@ -74,8 +75,7 @@ class ChoosingSearch(RankingSearch):
         best = self._nearest_to_description(self._simplest_of_family(best, ranking), ranking)
         return self._plain_friction_first(best, ranking)
 
-    @staticmethod
-    def _plain_friction_first(best: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
+    def _plain_friction_first(self, best: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
         """Plain friction that the model lacks, before what may only resemble it.
 
         Every joint has viscous and Coulomb friction. Where the model has neither, a power of the
@@ -83,6 +83,10 @@ class ChoosingSearch(RankingSearch):
         """
         if best.kind == UNKNOWN or get_effect(best.kind).is_exact or within_recordings(best):
             return best
+
+        def removed(h: Hypothesis) -> float:
+            return float(removed_share(h.gain, self._counts)[list(best.joints)].sum())
+
         plain = [
             h
             for h in ranking
@@ -91,8 +95,7 @@ class ChoosingSearch(RankingSearch):
             and not h.is_further_form
             and get_effect(h.kind).is_exact
             and get_effect(h.kind).drawn_against == "dq"
-            and set(h.joints) & set(best.joints)
-            and h.score > FRICTION_SHARE * best.score
+            and removed(h) > FRICTION_SHARE * removed(best)
         ]
         return max(plain, key=lambda h: h.score, default=best)
 

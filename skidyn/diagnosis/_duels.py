@@ -32,7 +32,7 @@ class DuellingSearch(JudgingSearch):
         One effect on all joints explains more than another one on each, so that it may also be
         chosen for a joint on which it only resembles the right one. There, the rule for the choice
         is applied to this joint alone. Joints of one robot have the same design: another effect
-        that is not exact must explain more than the common one.
+        must explain more than the common one, or as much if it is exact.
 
         Parameters
         ----------
@@ -55,14 +55,19 @@ class DuellingSearch(JudgingSearch):
             if own is None or other is None:
                 kept.append(candidate)
                 continue
-            more = (1 - self.settings.simpler_share) * other.score > own.score
-            if other.kind == best.kind or not (get_effect(other.kind).is_exact or more):
+            if other.kind == best.kind or not self._explains_more(other, own):
                 kept.append(candidate)
                 margin = margin_over(own, rivals_among(own, ranking))
                 alone.append(ranked_with(replace(own, margin=margin), ranking))
         if 0 < len(kept) < len(best.candidates):
             best = self._of_terms(best, kept)
         return replace(best, alone=tuple(alone))
+
+    def _explains_more(self, other: Hypothesis, own: Hypothesis) -> bool:
+        """Whether another effect on a joint is better than one that is found on others, too."""
+        if get_effect(other.kind).is_exact:
+            return bool(other.gain.sum() >= own.gain.sum())
+        return (1 - self.settings.simpler_share) * other.score > own.score
 
     def _of_terms(self, best: Hypothesis, kept: Sequence[Candidate]) -> Hypothesis:
         """Some terms of an explanation, with their own score."""

@@ -91,7 +91,7 @@ BEYOND_FORMULAS = 0.5
 #: identified bodies differs from that of the described ones by less than this share of the others.
 NEARER = 0.5
 #: Viscous or Coulomb friction that the model lacks is added before another effect on its joints if
-#: it explains more than this share of what that explains (``_choice.py``).
+#: it removes more than this share of the squared error that that removes (``_choice.py``).
 FRICTION_SHARE = 0.5
 #: A plain formula is not as good as a further form of another effect if it leaves more than this
 #: multiple of the squared error: where an effect is much larger than the noise, what its imperfect

@@ -32,6 +32,18 @@ def motion():
 
 
 @pytest.fixture(scope="session")
+def without_friction():
+    """A planar arm of which the torque is that of the bodies, with noise of 2 % of its size."""
+    robot = load_planar_arm()
+    log = make_hidden_effect_log(robot, None, noise="low", random_state=3)
+    q, dq, ddq = (log.X[[f"{s}1", f"{s}2"]].to_numpy() for s in ("q", "dq", "ddq"))
+    torque = robot.inverse_dynamics(q, dq, ddq)
+    size = np.std(torque, axis=0)
+    torque += np.random.default_rng(0).normal(0.0, 0.02, torque.shape) * size
+    return SimpleNamespace(robot=robot, X=log.X, q=q, dq=dq, torque=torque, size=size)
+
+
+@pytest.fixture(scope="session")
 def spring_log():
     return make_hidden_effect_log(load_planar_arm(), "spring", joints=[2])
 

@@ -33,3 +33,30 @@ def test_of_explanations_that_a_mass_makes_equal_the_one_with_bodies_as_describe
     (finding,) = diagnose(RBDRegressor(robot), X, torque, checks=()).findings
 
     assert (finding.kind, finding.joints) == (kind, (2,))
+
+
+def test_plain_friction_that_the_model_lacks_is_found_before_a_power_of_the_velocity(
+    without_friction,
+):
+    """Together, viscous and Coulomb friction resemble a small power of the velocity."""
+    arm = without_friction
+    torque = arm.torque + 0.1 * arm.size * (np.sign(arm.dq) + arm.dq)
+
+    findings = diagnose(RBDRegressor(arm.robot, ()), arm.X, torque, checks=()).findings
+
+    found = {(f.kind, j) for f in findings for j in f.joints}
+    assert found == {("coulomb", 1), ("coulomb", 2), ("viscous", 1), ("viscous", 2)}
+
+
+def test_an_offset_over_a_logged_temperature_is_no_offset_that_grows(without_friction):
+    arm = without_friction
+    since = arm.X["time"].to_numpy() - arm.X["time"].to_numpy().min()
+    warm = -10.0 * np.expm1(-since / 500.0)
+    torque = arm.torque.copy()
+    torque[:, 0] += 0.01 * arm.size[0] * warm
+    X = arm.X.assign(temp1=30.0 + warm, temp2=30.0 + warm)
+
+    (finding,) = diagnose(RBDRegressor(arm.robot, ()), X, torque, checks=()).findings
+
+    assert (finding.kind, finding.joints) == ("temperature_offset", (1,))
+    assert set(finding.parameters) == {"dtau_dT", "tau0"}

@@ -9,10 +9,15 @@ from skidyn.effects import get_effect
 def test_temperature(signals, columns_of):
     warm, v = signals.temperature[:, 1] - 30.0, signals.dq[:, 1]
     block = columns_of("temperature_friction", signals, 1)
-    expected = np.column_stack([warm * v, warm * signals.sign[:, 1], warm**2 * v])
-    np.testing.assert_allclose(block, expected)
+    plain = np.column_stack([warm * v, warm * signals.sign[:, 1]])
+    np.testing.assert_allclose(block, plain)
+    curved = columns_of("temperature_friction", signals, 1, curved=1.0)
+    np.testing.assert_allclose(curved, np.column_stack([plain, warm**2 * v]))
+    ones = np.ones_like(warm)
     offset = columns_of("temperature_offset", signals, 1)
-    np.testing.assert_allclose(offset, np.column_stack([warm, warm**2, np.ones_like(warm)]))
+    np.testing.assert_allclose(offset, np.column_stack([warm, ones]))
+    curved = columns_of("temperature_offset", signals, 1, curved=1.0)
+    np.testing.assert_allclose(curved, np.column_stack([warm, warm**2, ones]))
     cold = signals.with_(temperature=None)
     assert "no temperature" in get_effect("temperature_friction").not_shown(cold, 0)
 
