@@ -18,6 +18,7 @@ from skidyn.diagnosis._hypothesis import (
     family_of,
     grouped_by_joints,
     in_part,
+    is_plain_friction,
     removed_share,
     simplicity_of,
     some_recordings,
@@ -365,8 +366,11 @@ class JudgingSearch(ChoosingSearch):
         )
 
     def _alike(self, best: Hypothesis, rivals: Sequence[Hypothesis]) -> bool:
-        """Whether a known effect on other joints explains equally much."""
-        return any(
+        """Whether a known effect on other joints explains equally much.
+
+        It says nothing against friction that every joint has.
+        """
+        return not is_plain_friction(best) and any(
             h.kind != UNKNOWN
             and h.joints != best.joints
             and h.score >= (1 - self.settings.alike) * best.score

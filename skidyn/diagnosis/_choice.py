@@ -16,6 +16,7 @@ from skidyn.diagnosis._hypothesis import (
     Hypothesis,
     family_of,
     in_part,
+    is_plain_friction,
     removed_share,
     simplicity_of,
     within_recordings,
@@ -90,12 +91,7 @@ class ChoosingSearch(RankingSearch):
         plain = [
             h
             for h in ranking
-            if h.kind != UNKNOWN
-            and not within_recordings(h)
-            and not h.is_further_form
-            and get_effect(h.kind).is_exact
-            and get_effect(h.kind).drawn_against == "dq"
-            and removed(h) > FRICTION_SHARE * removed(best)
+            if is_plain_friction(h) and removed(h) > FRICTION_SHARE * removed(best)
         ]
         return max(plain, key=lambda h: h.score, default=best)
 

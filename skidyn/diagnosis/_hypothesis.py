@@ -198,6 +198,14 @@ def rivals_among(best: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypoth
     ]
 
 
+def is_plain_friction(hypothesis: Hypothesis) -> bool:
+    """Whether it is viscous or Coulomb friction, which every joint has, in all recordings."""
+    if hypothesis.kind == UNKNOWN or within_recordings(hypothesis) or hypothesis.is_further_form:
+        return False
+    effect = get_effect(hypothesis.kind)
+    return effect.is_exact and effect.drawn_against == "dq"
+
+
 def margin_over(best: Hypothesis, rivals: Sequence[Hypothesis]) -> float:
     """Margin over the rivals, as a share of the best score."""
     if not rivals or best.score <= 0:

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from skidyn.diagnosis._findings import Finding
     from skidyn.diagnosis._result import Diagnosis
 
+#: Difference of the confidence between joints that is told.
+NOTICED = 0.05
 #: Mark of a complete model.
 SOUND = "✓"
 #: A relative change of an error below this counts as none.
@@ -250,6 +252,8 @@ def _line(diagnosis: Diagnosis, k: int, rows: Sequence[dict[str, Any]]) -> dict[
         "size": ", ".join(shown[: _told(finding)]),
         "clear": dict(zip(shown, weights, strict=True)),
         "sure": sure(finding),
+        "beside": finding.rivals,
+        "share": share,
         "doubtful": bool(finding.rivals) or share < SURE,
         "guess": share < GUESS,
         "change": change,
@@ -276,7 +280,6 @@ def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
         if len(card["clear"]) > at
     ]
     more = len(sizes_told) - LISTED
-    doubtful = next((card for card in group if card["doubtful"]), best)
     change = best["change"]
     return {
         **best,
@@ -284,10 +287,24 @@ def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "joints": joints,
         "where": joints_told(joints) + (" in some trajectories" if best["only"] else ""),
         "size": ", ".join(sizes_told[:LISTED]) + (f" and {more} more" if more > 0 else ""),
-        "sure": doubtful["sure"],
-        "doubtful": doubtful["doubtful"],
+        "sure": _least_sure(group),
+        "doubtful": any(card["doubtful"] for card in group),
         "change": change if change.startswith("joint") else f"joint {best['joints'][0]}: {change}",
     }
+
+
+def _least_sure(group: Sequence[dict[str, Any]]) -> str:
+    """Text of the joints that are least sure, and the confidence of those with other rivals."""
+    least = min(group, key=lambda card: card["share"])
+    others = [card for card in group if card["beside"] != least["beside"]]
+    if not others or least["share"] > min(card["share"] for card in others) - NOTICED:
+        return str(least["sure"])
+    alike = [card for card in group if card["beside"] == least["beside"]]
+    own, rest = (
+        joints_told(sorted({j for c in cards for j in c["joints"]})) for cards in (alike, others)
+    )
+    share = min(card["share"] for card in others)
+    return f"on {rest} confidence {min(share, 0.99):.0%}; on {own} {least['sure']}"
 
 
 def _first_clear(weights: Sequence[Sequence[float]]) -> int:
