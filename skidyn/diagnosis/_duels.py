@@ -11,6 +11,7 @@ import numpy as np
 
 from skidyn.diagnosis._acceptance import JudgingSearch
 from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._confidence import SEPARATES
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
@@ -32,7 +33,7 @@ class DuellingSearch(JudgingSearch):
         One effect on all joints explains more than another one on each, so that it may also be
         chosen for a joint on which it only resembles the right one. There, the rule for the choice
         is applied to this joint alone. Joints of one robot have the same design: another effect
-        must explain more than the common one, or as much if it is exact.
+        must explain more than the common one.
 
         Parameters
         ----------
@@ -66,7 +67,8 @@ class DuellingSearch(JudgingSearch):
     def _explains_more(self, other: Hypothesis, own: Hypothesis) -> bool:
         """Whether another effect on a joint is better than one that is found on others, too."""
         if get_effect(other.kind).is_exact:
-            return bool(other.gain.sum() >= own.gain.sum())
+            more = float((other.gain - own.gain).sum())
+            return more > SEPARATES * self._price(other.candidates)
         return (1 - self.settings.simpler_share) * other.score > own.score
 
     def _of_terms(self, best: Hypothesis, kept: Sequence[Candidate]) -> Hypothesis:
