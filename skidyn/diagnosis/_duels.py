@@ -16,9 +16,9 @@ from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
     margin_over,
+    on_single_joints,
     ranked_with,
     rivals_among,
-    within_recordings,
 )
 from skidyn.diagnosis._rule import COMPARABLE
 from skidyn.effects import get_effect
@@ -45,7 +45,7 @@ class DuellingSearch(JudgingSearch):
         Hypothesis
             The effect on at least one of its joints, with what its terms were compared with.
         """
-        if len(best.candidates) < 2 or within_recordings(best) or not self._on_single_joints(best):
+        if len(best.candidates) < 2 or not on_single_joints(best):
             return best
         kept, alone = [], []
         for candidate in best.candidates:
@@ -95,12 +95,6 @@ class DuellingSearch(JudgingSearch):
             yield
         finally:
             self.chosen = chosen
-
-    @staticmethod
-    def _on_single_joints(best: Hypothesis) -> bool:
-        """Whether its terms are columns of single joints."""
-        known = best.kind != UNKNOWN and best.torque is None
-        return known and all(c.term.effect.scope == "joint" for c in best.candidates)
 
     def _rivals_alone(self, kind: str, candidate: Candidate) -> list[Hypothesis]:
         """A term and other known effects on its joint, best first; empty without others."""

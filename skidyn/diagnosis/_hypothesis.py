@@ -198,6 +198,14 @@ def rivals_among(best: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypoth
     ]
 
 
+def on_single_joints(hypothesis: Hypothesis) -> bool:
+    """Whether it is a known effect on single joints, found on rows of all recordings."""
+    if hypothesis.kind == UNKNOWN or within_recordings(hypothesis):
+        return False
+    effect = get_effect(hypothesis.kind)
+    return hypothesis.torque is None and effect.scope == "joint" and effect.search == "grid"
+
+
 def is_plain_friction(hypothesis: Hypothesis) -> bool:
     """Whether it is viscous or Coulomb friction, which every joint has, in all recordings."""
     if hypothesis.kind == UNKNOWN or within_recordings(hypothesis) or hypothesis.is_further_form:

@@ -17,6 +17,7 @@ from skidyn.diagnosis._hypothesis import (
     close_shapes,
     family_of,
     margin_over,
+    on_single_joints,
     ranked_with,
     rivals_among,
     uses_the_fit,
@@ -273,7 +274,7 @@ class ReconsideringSearch(DuellingSearch):
             if old.kind == UNKNOWN or get_effect(old.kind).is_exact:
                 continue  # an exact formula that explains equally much is right
             for other in list(self.findings):
-                if old is other or not all(map(self._of_own_joints, (old, other))):
+                if old is other or not all(map(on_single_joints, (old, other))):
                     continue
                 both = self._also(other, old.kind) is not None
                 if set(old.joints) & set(other.joints) or (both and old.score > other.score):
@@ -294,13 +295,6 @@ class ReconsideringSearch(DuellingSearch):
                 self.refit()
                 self.sigma = self.weights()
                 break
-
-    def _of_own_joints(self, finding: Hypothesis) -> bool:
-        """Whether it is a known effect on single joints, found on rows of all recordings."""
-        if finding not in self.findings or finding.kind == UNKNOWN or within_recordings(finding):
-            return False
-        effect = get_effect(finding.kind)
-        return finding.torque is None and effect.scope == "joint" and effect.search == "grid"
 
     def _also(self, finding: Hypothesis, kind: str) -> Hypothesis | None:
         """Another kind on the same joints that explains nearly as much as a finding."""

@@ -106,7 +106,7 @@ class TemperatureOffset(_OverTemperature):
 
     kind = "temperature_offset"
     title = "Temperature-dependent offset"
-    formula = r"\tfrac{d\tau}{dT}\,(T - T_0) + \tfrac{d^2\tau}{dT^2}\,(T - T_0)^2 + \tau_0"
+    formula = r"\tfrac{d\tau}{dT}\,(T - T_0) + \tau_0"
     coefficients = (
         Coefficient("dtau_dT", "N m/K"),
         Coefficient("d2tau_dT2", "N m/K^2"),
