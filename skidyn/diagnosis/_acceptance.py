@@ -47,8 +47,10 @@ class JudgingSearch(ChoosingSearch):
             ]
             worst = int(np.argmax(chances))
             if self.significant(chances[worst], candidates[worst]):
-                if not all(self._acts_on_both(c, candidates) for c in candidates):
-                    return None
+                seen = [self._acts_on_both(c, candidates) for c in candidates]
+                if not all(seen):
+                    del candidates[int(np.argmax(np.where(seen, -1.0, chances)))]
+                    continue
                 kept = [j for c in candidates for j in c.rows]
                 gain = np.where(np.isin(np.arange(len(hypothesis.gain)), kept), hypothesis.gain, 0)
                 gain = hypothesis.gain if len(candidates) == len(hypothesis.candidates) else gain

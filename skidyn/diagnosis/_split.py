@@ -88,7 +88,7 @@ def split_effects(
         if free.sum() < 2:
             continue
         usual = effect.grid(problem.few, joints)
-        most = 0.0
+        most, of_kind = 0.0, list[tuple[Split, _Products]]()
         for shape in [*usual, *effect.elsewhere(problem.few)]:
             term = Term.at(kind, joints, shape)
             rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
@@ -99,7 +99,46 @@ def split_effects(
             else:
                 least = effect.elsewhere_must_gain * most
                 splits = [split for split in splits if float(split.drop.sum()) > least]
-            found += splits
+            of_kind += [(split, products) for split in splits]
+        found += _best_exchanged(problem, of_kind, names, free)
+    return found
+
+
+def _best_exchanged(
+    problem: Problem,
+    splits: Sequence[tuple[Split, _Products]],
+    names: NDArray[Any],
+    free: NDArray[np.bool_],
+) -> list[Split]:
+    """Splits of a kind, of which the best one has had its trajectories exchanged one by one.
+
+    The estimate of a single trajectory may be arbitrary in some directions, if few joints move or
+    all of them move little, so that gaps between estimates may miss it.
+    """
+    found = [split for split, _ in splits]
+    drops = [-np.inf if split.apart else float(split.drop.sum()) for split in found]
+    best = int(np.argmax(drops)) if drops else 0
+    if not drops or drops[best] <= SEPARATES:
+        return found
+    split, products = splits[best]
+    chosen = np.isin(names, split.candidate.term.trajectories or ())
+    drop = split.drop
+    while True:
+        others = [chosen ^ step for step in np.eye(len(names), dtype=bool)[free]]
+        others = [o for o in others if o.any() and not np.all(o >= free)]
+        tried = [products.drop(o) for o in others]
+        # one more trajectory has to explain something, one less may explain as much
+        gains = [
+            float((own - drop).sum()) - SEPARATES * float(o.sum() > chosen.sum())
+            for own, o in zip(tried, others, strict=True)
+        ]
+        k = int(np.argmax(gains)) if gains else 0
+        if not gains or gains[k] <= 0:
+            break
+        drop, chosen = tried[k], others[k]
+    term = split.candidate.term.with_shape(trajectories=tuple(names[chosen].tolist()))
+    rows = problem.term_rows(term)
+    found[best] = Split(Candidate(term.kind, term, rows), drop)
     return found
 
 

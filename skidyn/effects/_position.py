@@ -14,10 +14,11 @@ from skidyn.effects._parameters import Coefficient, Shape
 
 
 class PositionDependentFriction(Effect):
-    """Dry friction whose level changes along the joint's travel.
+    """Friction whose level changes along the joint's travel.
 
-    It varies as a wave, as a wave with its second harmonic (``overtone``), or is higher or lower at
-    one ``place`` of some ``width`` by a dry part ``dFc`` and a viscous part ``dFv``.
+    Dry friction varies as a wave or as a wave with its second harmonic (``overtone``), viscous
+    friction as a wave (``viscous``); or both are higher or lower at one ``place`` of some ``width``
+    by a dry part ``dFc`` and a viscous part ``dFv``.
     """
 
     kind = "position_dependent_friction"
@@ -34,7 +35,7 @@ class PositionDependentFriction(Effect):
     )
     #: Places that are tried, and widths, as shares of the travel.
     spots = tuple({"place": k / 8, "width": w} for w in (0.06, 0.15) for k in range(1, 8))
-    forms = ({"overtone": 1.0}, *spots)
+    forms = ({"overtone": 1.0}, {"viscous": 1.0}, *spots)
     simplicity = 22
     rivals = ("load_dependent_friction", "coulomb")
     separating_motion = "slow sweeps over the whole travel in both directions"
@@ -51,21 +52,28 @@ class PositionDependentFriction(Effect):
         # one wave and two over the travel: friction that varies irregularly
         own = (2 * np.pi / span, 4 * np.pi / span) if span > 0 else ()
         rich = [{"n": n, "overtone": 1.0} for n in (*waves, *own)]
-        return [*({"n": n} for n in waves), *rich, *spots]
+        thick = [{"n": n, "viscous": 1.0} for n in waves]
+        return [*({"n": n} for n in waves), *rich, *thick, *spots]
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        if "viscous" in shape:
+            return (Coefficient("a", "N m s/rad"), Coefficient("b", "N m s/rad"))
         if "overtone" not in shape:
             return self.coefficients
         return (*self.coefficients, Coefficient("a2", "N m"), Coefficient("b2", "N m"))
 
     def travel(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> float:
-        return super().travel(signals, joints, shape) if "place" in shape else 1.0
+        travel = super().travel(signals, joints, shape)
+        # one more wave over the travel
+        return travel if "place" in shape else 2 * np.pi / max(travel, 1e-9)
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         q, sign = signals.q[:, joint], signals.sign[:, joint]
         if "place" in shape:
             near = np.exp(-0.5 * ((q - shape["place"]) / shape["width"]) ** 2)
             return np.column_stack([near * sign, near * signals.dq[:, joint]])
+        if "viscous" in shape:
+            sign = signals.dq[:, joint]
         phases = [shape["n"] * q] + [2 * shape["n"] * q] * ("overtone" in shape)
         return np.column_stack([wave(p) * sign for p in phases for wave in (np.cos, np.sin)])
 
@@ -75,7 +83,8 @@ class PositionDependentFriction(Effect):
         a, b, *more = map(float, coefficients)
         if "place" in shape:
             return {"dFc": a, "dFv": b, **shape}
-        told = {"A": float(np.hypot(a, b)), "phase": float(np.arctan2(b, a)), **shape}
+        size = "Av" if "viscous" in shape else "A"
+        told = {size: float(np.hypot(a, b)), "phase": float(np.arctan2(b, a)), **shape}
         if more:
             c, d = more
             told |= {"A2": float(np.hypot(c, d)), "phase2": float(np.arctan2(d, c))}
@@ -85,7 +94,7 @@ class PositionDependentFriction(Effect):
         torque, length = ("N", "m") if prismatic else ("N m", "rad")
         spot = {"dFc": torque, "dFv": f"{torque} s/{length}", "place": length, "width": length}
         wave = {"A": torque, "phase": "rad", "n": f"1/{length}", "A2": torque, "phase2": "rad"}
-        return wave | spot
+        return wave | spot | {"Av": spot["dFv"]}
 
 
 class TorqueRipple(Effect):

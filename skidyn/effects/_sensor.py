@@ -98,11 +98,16 @@ class TimeDelay(Effect):
 LEAST_CUT = 0.3
 
 
+#: Quantiles of the torque that are tried as its limit: rare peaks are far above it.
+CUT_OFF = (0.98, 0.92)
+
+
 class Saturation(Effect):
     """The logged or delivered torque is cut off at a limit.
 
     With ``rounding`` in its shape the torque approaches the limit smoothly, as a hyperbolic tangent
-    if ``rounding`` is 1. With a ``side`` only positive (1) or negative torque (-1) is cut off. The
+    if ``rounding`` is 1. With a ``side`` only positive (1) or negative torque (-1) is cut off; with
+    ``limit_below`` negative torque is cut off at another size, as in a hydraulic cylinder. The
     ``share`` of the torque beyond the limit that is cut off is at least 0.3.
     """
 
@@ -111,9 +116,12 @@ class Saturation(Effect):
     title = "Torque saturation"
     formula = r"-c\,\mathrm{sign}(\tau)\max(0,\,|\tau| - L)"
     coefficients = (Coefficient("share", "1", sign=1, is_share=True),)
-    shapes = (Shape("limit", "N m", (0.97, 0.93, 0.88, 0.8, 0.7, 0.6), 1e-9, np.inf, scales=False),)
+    shapes = (
+        Shape("limit", "N m", (0.97, 0.93, 0.88, 0.8, 0.7, 0.6), 1e-9, np.inf, scales=False),
+        Shape("limit_below", "N m", (), 1e-9, np.inf, scales=False),
+    )
     #: A rounded limit has an effect far below it.
-    forms = ({"rounding": 1.0}, {"side": 1.0}, {"side": -1.0})
+    forms = ({"rounding": 1.0}, {"side": 1.0}, {"side": -1.0}, {"limit_below": 1.0})
     needs = ("model_torque",)
     simplicity = 15
     rivals = ("torque_gain",)
@@ -126,14 +134,20 @@ class Saturation(Effect):
         highest = float(np.quantile(np.abs(torque), 0.999))
         if not highest > 0:
             return []
-        rounded, *sides = map(dict, self.forms)
-        shapes = [{"limit": share * highest} for share in self.shapes[0].grid]
+        rounded, *sides, _ = map(dict, self.forms)
+        shares = self.shapes[0].grid
+
+        def limits(torque: Array, shares: Sequence[float]) -> list[float]:
+            most, *peaks = np.quantile(torque, (0.999, *CUT_OFF)).tolist()
+            return [x for x in (*(share * most for share in shares), *peaks) if x > 0]
+
+        shapes = [{"limit": limit} for limit in limits(np.abs(torque), shares)]
         shapes += [{"limit": highest / share} | rounded for share in (0.6, 0.9)]
-        for form in sides:
-            most = float(np.quantile(form["side"] * torque, 0.999))
-            shares = self.shapes[0].grid[1::2] if most > 0 else ()
-            shapes += [{"limit": share * most} | form for share in shares]
-        return shapes
+        ends = [limits(form["side"] * torque, shares[1::2]) for form in sides]
+        for form, own in zip(sides, ends, strict=True):
+            shapes += [{"limit": limit} | form for limit in own]
+        pairs = zip(*ends, strict=False) if len(ends[0]) == len(ends[1]) else ()
+        return shapes + [{"limit": a, "limit_below": b} for a, b in pairs]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.model_torque is not None
@@ -144,8 +158,8 @@ class Saturation(Effect):
         if "side" in shape:
             side = shape["side"]
             return np.asarray(-side * np.maximum(0.0, side * torque - shape["limit"]))[:, None]
-        missing: Array = -np.sign(torque) * np.maximum(0.0, np.abs(torque) - shape["limit"])
-        return missing[:, None]
+        below = shape.get("limit_below", shape["limit"])
+        return np.asarray(np.clip(torque, -below, shape["limit"]) - torque)[:, None]
 
     def least(self, shape: Mapping[str, Any]) -> float:
         return LEAST_CUT
@@ -153,4 +167,5 @@ class Saturation(Effect):
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
-        return {"limit": shape["limit"], "share": float(coefficients[0])}
+        limits = {name: shape[name] for name in ("limit", "limit_below") if name in shape}
+        return limits | {"share": float(coefficients[0])}

@@ -41,3 +41,14 @@ def test_friction_along_the_travel_may_have_an_overtone(signals):
     )
     assert (found["A2"], found["phase2"]) == (0.2, np.pi / 2)
     assert set(found) - set(shape) <= set(effect.units())
+
+
+def test_viscous_friction_may_vary_along_the_travel(signals):
+    effect, shape = get_effect("position_dependent_friction"), {"n": 2.0, "viscous": 1.0}
+    values = np.array([0.3, -0.4])
+    found, q = effect.parameters(values, shape), signals.q[:, 0]
+    np.testing.assert_allclose(
+        effect.columns(signals, 0, **shape) @ values,
+        found["Av"] * np.cos(2 * q - found["phase"]) * signals.dq[:, 0],
+    )
+    assert effect.units()["Av"] == "N m s/rad"

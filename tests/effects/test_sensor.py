@@ -40,3 +40,13 @@ def test_a_limit_on_one_side_leaves_the_other_alone(signals, columns_of, side):
     cut = torque + columns_of("saturation", signals, limit=0.4, side=side)[:, 0]
     expected = np.minimum(torque, 0.4) if side > 0 else np.maximum(torque, -0.4)
     np.testing.assert_allclose(cut, expected)
+
+
+def test_limits_of_both_directions_may_differ(signals, columns_of):
+    torque = signals.model_torque[:, 0]
+    missing = columns_of("saturation", signals, limit=0.7, limit_below=0.4)
+    np.testing.assert_allclose(torque + missing[:, 0], np.clip(torque, -0.4, 0.7))
+    effect = get_effect("saturation")
+    shapes = [s for s in effect.grid(signals, (0,)) if "limit_below" in s]
+    assert shapes
+    assert all(set(effect.parameters(np.ones(1), s)) <= set(effect.units()) for s in shapes)
