@@ -122,23 +122,22 @@ def _best_exchanged(
         return found
     split, products = splits[best]
     chosen = np.isin(names, split.candidate.term.trajectories or ())
-    drop = split.drop
+
+    def worth(chosen: NDArray[np.bool_]) -> float:
+        return products.explained(chosen) - SEPARATES * float(chosen.sum())
+
+    most = worth(chosen)
     while True:
         others = [chosen ^ step for step in np.eye(len(names), dtype=bool)[free]]
         others = [o for o in others if o.any() and not np.all(o >= free)]
-        tried = [products.drop(o) for o in others]
-        # one more trajectory has to explain something, one less may explain as much
-        gains = [
-            float((own - drop).sum()) - SEPARATES * float(o.sum() > chosen.sum())
-            for own, o in zip(tried, others, strict=True)
-        ]
-        k = int(np.argmax(gains)) if gains else 0
-        if not gains or gains[k] <= 0:
+        worths = [worth(o) for o in others]
+        if not worths or max(worths) <= most:
             break
-        drop, chosen = tried[k], others[k]
+        most = max(worths)
+        chosen = others[worths.index(most)]
     term = split.candidate.term.with_shape(trajectories=tuple(names[chosen].tolist()))
     rows = problem.term_rows(term)
-    found[best] = Split(Candidate(term.kind, term, rows), drop)
+    found[best] = Split(Candidate(term.kind, term, rows), products.drop(chosen))
     return found
 
 
@@ -252,8 +251,24 @@ class _Products:
         solution: Array = scaled / scale
         return solution[p:].reshape(n, leading)
 
+    def explained(self, chosen: NDArray[np.bool_]) -> float:
+        """What the model explains when chosen trajectories get the effect, without a part held out.
+
+        What is left out in turn is predicted badly where few trajectories determine the bodies;
+        sets of trajectories have equally many coefficients and need no such comparison.
+        """
+        grams = self._with_effect(chosen).sum(0)
+        gram, right = grams[:-1, :-1], grams[:-1, -1]
+        scale = column_sizes(gram)
+        scaled = gram / scale[:, None] / scale + 1e-9 * np.eye(len(gram))
+        return float(right / scale @ np.linalg.solve(scaled, right / scale))
+
     def drop(self, chosen: NDArray[np.bool_]) -> Array:
         """Held-out drop of squared error by quarter when chosen trajectories get the effect."""
+        return self.errors - left_out_errors(self._with_effect(chosen))
+
+    def _with_effect(self, chosen: NDArray[np.bool_]) -> Array:
+        """Products of [model | effect in chosen trajectories | torque] by quarter."""
         p, k = self.gram.shape[1] - 1, self.own.shape[2]
         place = np.append(np.arange(p), p + k)  # the torque comes last
         effect = slice(p, p + k)
@@ -263,7 +278,7 @@ class _Products:
         grams[:, place, effect] = cross
         grams[:, effect, place] = cross.transpose(0, 2, 1)
         grams[:, effect, effect] = self.own[chosen].sum(0)
-        return self.errors - left_out_errors(grams)
+        return grams
 
     @cached_property
     def errors(self) -> Array:

@@ -84,6 +84,20 @@ def test_what_depends_on_another_joint_without_a_reaction_is_no_coupling():
     assert diagnosis.verdict == "unknown"
 
 
+def test_friction_without_a_reaction_does_not_hide_that_of_a_coupling():
+    log = make_hidden_effect_log(
+        load_ur5(), "coupled_friction", joints=(2, 3), noise="low", n_trajectories=8, random_state=2
+    )
+    X, torque = log.X, log.y.copy()
+    torque[:, 4] += 0.3 * torque[:, 4].std() * np.sign(X["dq2"] + 1.1 * X["dq5"])
+    model = RBDRegressor(log.robot, effects=["viscous", "coulomb"])
+
+    diagnosis = diagnose(model, X, torque, effects=["coupled_friction"], checks=())
+
+    found = {(f.kind, f.joints) for f in diagnosis.findings}
+    assert found == {("coupled_friction", (2, 3)), ("unknown", (5,))}
+
+
 @pytest.mark.slow
 def test_a_floor_that_explains_all_that_a_larger_force_leaves_is_no_error_of_the_force(found_in):
     """Nor is the force withdrawn because it increases the error until the floor is found."""

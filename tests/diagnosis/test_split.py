@@ -2,6 +2,7 @@
 """Loads that some recordings have."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from skidyn.datasets import load_panda, load_planar_arm, load_ur5, make_hidden_effect_log
@@ -123,3 +124,33 @@ def test_a_payload_of_another_link_is_one_and_not_a_zero_of_its_joint():
     assert not [check for check in diagnosis.checks if check.certainty != "noted"]
     better = diagnosis.add("payload", joints=[4])
     assert [term.form for term in better.effect_terms_ if term.kind == "payload"] == [{"link": 3}]
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+def test_a_force_is_found_in_recordings_in_which_a_single_joint_moves(seed):
+    """Their own estimates of the force are arbitrary, but their torque tells whether it acts."""
+    rng, robot, acting = np.random.default_rng(seed), load_panda(), (1, 2, 7)
+    time, motions, torques = np.arange(0, 5, 0.01), [], []
+    middle = np.array([0.0, 0.0, 0.0, -1.5, 0.0, 1.5, 0.0])
+    for k in range(9):
+        frequency, phase, size = (
+            rng.uniform(*r, (7, 3)) for r in ((0.1, 0.5), (0, 6.3), (0.1, 0.4))
+        )
+        if k < 7:
+            size[np.arange(7) != k] = 0.0
+        rate = 2 * np.pi * frequency
+        waves = [np.sin(rate * time[:, None, None] + phase + turn) for turn in (0, np.pi / 2)]
+        q = middle + rng.uniform(-0.6, 0.6, 7) + (size * waves[0]).sum(2)
+        dq, ddq = (size * rate * waves[1]).sum(2), -(size * rate**2 * waves[0]).sum(2)
+        torque = robot.inverse_dynamics(q, dq, ddq) + rng.normal(0, 0.6, q.shape)
+        if k in acting:
+            torque -= np.einsum("iaj,a->ij", robot.jacobian(q)[:, :3], [1.3, 4.0, -2.7])
+        names = [f"{name}{j}" for name in ("q", "dq", "ddq") for j in range(1, 8)]
+        motion = pd.DataFrame(np.hstack([q, dq, ddq]), columns=names)
+        motions.append(motion.assign(time=time + 6 * k, trajectory=k))
+        torques.append(torque)
+    X = pd.concat(motions, ignore_index=True)
+
+    found = diagnose(RBDRegressor(robot), X, np.vstack(torques), effects=KINDS, checks=()).findings
+
+    assert [(f.kind, f.trajectories) for f in found] == [("external_wrench", acting)]
