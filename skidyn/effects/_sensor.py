@@ -158,8 +158,9 @@ class Saturation(Effect):
         if "side" in shape:
             side = shape["side"]
             return np.asarray(-side * np.maximum(0.0, side * torque - shape["limit"]))[:, None]
-        below = shape.get("limit_below", shape["limit"])
-        return np.asarray(np.clip(torque, -below, shape["limit"]) - torque)[:, None]
+        above = np.maximum(0.0, torque - shape["limit"])
+        below = np.maximum(0.0, -torque - shape.get("limit_below", shape["limit"]))
+        return np.asarray(below - above)[:, None]
 
     def least(self, shape: Mapping[str, Any]) -> float:
         return LEAST_CUT

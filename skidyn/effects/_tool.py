@@ -256,9 +256,9 @@ _BALL = ("radius", "center_x", "center_y", "center_z")
 #: the share of the motion that its surface leaves inside.
 _PLACES, _SPREAD, _INSIDE = 20, 1.3, 0.22
 #: Directions (azimuth and elevation in rad) of planes that are tried in addition to the axes: walls
-#: and tilted tables.
+#: and tilted tables. From them a direction is refined, which that of an axis is not.
 _OBLIQUE = (
-    *((np.pi * (k + 0.5) / 2, 0.0) for k in range(4)),
+    *((np.pi * k / 4, 0.0) for k in range(8)),
     *((np.pi * k / 2, np.pi / 3) for k in range(4)),
 )
 

@@ -110,8 +110,9 @@ def described(model: RBDRegressor | Robot, kinds: tuple[str, ...]) -> Descriptio
         values = model.effect_coefficients_[term]
         if is_carried(term):
             parameters[-1] += values
-        # No format has negative friction or springs, or a spring of one recording.
-        elif term.kind in kinds and values[0] >= 0.0 and is_lasting(term):
+        # No format has negative friction or springs, a spring of one recording, or an inertia that
+        # varies.
+        elif sizes.get(term.kind) == len(values) and values[0] >= 0.0 and is_lasting(term):
             joints[term.kind][term.places[0]] += values
         else:
             left.append(term)

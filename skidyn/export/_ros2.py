@@ -347,7 +347,7 @@ def _parameters(model: RBDRegressor | Robot, robot: Robot, held: Sequence[Term])
 
 
 def _add_coefficients(values: dict[str, dict[str, Any]], model: RBDRegressor, term: Term) -> None:
-    """A term's numbers at the index of its joint; a second term of a kind gets a number."""
+    """A term's numbers at the index of its joint; a second term or form of a kind gets a number."""
     (j,), number = term.places, 1
     names = [c.name for c in term.coefficients]
     own = dict(zip(names, model.effect_coefficients_[term], strict=True))
@@ -355,7 +355,7 @@ def _add_coefficients(values: dict[str, dict[str, Any]], model: RBDRegressor, te
     while True:
         kind = term.kind if number == 1 else f"{term.kind}_{number}"
         rows = values.setdefault(kind, {k: np.zeros(model.robot_.n_joints) for k in own})
-        if not any(rows[name][j] for name in rows):
+        if rows.keys() == own.keys() and not any(rows[name][j] for name in rows):
             break
         number += 1
     for name, value in own.items():

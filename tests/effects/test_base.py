@@ -10,7 +10,7 @@ from skidyn.effects import Signals, get_effect, list_effects
 
 def test_units_of_sliders():
     assert get_effect("viscous").units(prismatic=True) == {"Fv": "N s/m"}
-    assert get_effect("rotor_inertia").units(prismatic=True) == {"Ia": "kg"}
+    assert get_effect("spring").units(prismatic=True) == {"k": "N/m", "q0": "m"}
     slides = np.array([kind == "prismatic" for kind in load_scara().joint_types])
     zero = np.zeros((3, 4))
     scara = Signals(zero, zero, zero, trajectory=np.zeros(3), prismatic=slides)

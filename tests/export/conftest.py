@@ -41,6 +41,8 @@ STATIC = (
     Term("stribeck", (1,), {"vs": 0.1, "delta": 2.0}),
     Term("nonlinear_viscous", (2,), {"power": 1.7}),
     Term("position_dependent_friction", (2,), {"n": 2.0}),
+    Term("position_dependent_friction", (1,), {"n": 2.0, "viscous": 1.0}),
+    Term("rotor_inertia", (2,), {"varying": 1.0, "q_middle": 0.2}),
     Term("torque_ripple", (2,), {"N": 30.0}),
     Term("coupled_friction", (1, 2), {"ratio": -0.5}),
     Term("coupled_inertia", (1, 2), {"ratio": 0.5}),
@@ -49,6 +51,7 @@ STATIC = (
     ("gravity_compensator", [2]),
     Term("end_stop", (2,), {"q_lim": 0.3, "side": 1.0}),
     Term("saturation", (1,), {"limit": 0.5}),
+    Term("saturation", (2,), {"limit": 0.5, "limit_below": 0.4}),
 )
 
 LOADERS = {
