@@ -47,7 +47,7 @@ class DuellingSearch(JudgingSearch):
         """
         if len(best.candidates) < 2 or not on_single_joints(best):
             return best
-        kept, alone = [], []
+        kept, alone, lost = [], [], []
         for candidate in best.candidates:
             with self._beside_the_others(best, candidate):
                 ranking = self._rivals_alone(best.kind, candidate)
@@ -56,11 +56,16 @@ class DuellingSearch(JudgingSearch):
             if own is None or other is None:
                 kept.append(candidate)
                 continue
+            margin = margin_over(own, rivals_among(own, ranking))
+            compared = ranked_with(replace(own, margin=margin), ranking)
             if other.kind == best.kind or not self._explains_more(other, own):
                 kept.append(candidate)
-                margin = margin_over(own, rivals_among(own, ranking))
-                alone.append(ranked_with(replace(own, margin=margin), ranking))
-        if 0 < len(kept) < len(best.candidates):
+                alone.append(compared)
+            else:
+                lost.append(compared)
+        if not kept:
+            return replace(best, alone=tuple(lost))
+        if lost:
             best = self._of_terms(best, kept)
         return replace(best, alone=tuple(alone))
 

@@ -33,7 +33,8 @@ class LoadDependentFriction(Effect):
     The power is 1 if the shape has none. Another power is that of the load divided by a
     ``reference`` in N m (1 N m if the shape has none), so that ``mu`` is the lost share of a load
     of this size. With ``driving``, it acts only while the joint moves its load, and not while the
-    load moves the joint, as for the efficiency of many gears. With ``viscous``, it also grows with
+    load moves the joint; with ``backdriven``, it is this share of its size while the load moves the
+    joint, as for the efficiency of many gears. With ``viscous``, it also grows with
     the speed, in units of 1 rad/s or 1 m/s, so that ``mu`` has no unit. If the torque of the drive
     counts, the load includes the ``friction`` (N m or N) and the ``damping`` that the drive has to
     overcome as well, and the ``inertia`` of the rotor (kg m^2 or kg) that it accelerates. The
@@ -56,11 +57,13 @@ class LoadDependentFriction(Effect):
         Shape("damping", "N m s/rad", (), 1e-9, np.inf, scales=False, has_interval=False),
         Shape("inertia", "kg m^2", (), 1e-9, np.inf, scales=False, has_interval=False),
         Shape("threshold", "N m", (), 1e-9, np.inf, scales=False, has_interval=False),
+        Shape("backdriven", "1", (), 0.02, 1.0, scales=False),
     )
     forms = (
         {"power": 0.5},
         {"power": 2.0},
         {"driving": 1.0},
+        {"backdriven": 0.4},
         {"viscous": 1.0},
         {"friction": 0.3, "damping": 0.1},
         {"driving": 1.0, "friction": 0.3, "damping": 0.1},
@@ -119,8 +122,9 @@ class LoadDependentFriction(Effect):
             beyond = np.where(shape["side"] * carried > 0, beyond, 0.0)
         load = reference * (beyond / reference) ** shape.get("power", 1.0)
         friction: Array = load * (signals.dq if "viscous" in shape else signals.sign)[:, joint]
-        if "driving" in shape:
-            friction = friction * (carried * signals.dq[:, joint] > 0)
+        if "driving" in shape or "backdriven" in shape:
+            drives = carried * signals.dq[:, joint] > 0
+            friction = friction * np.where(drives, 1.0, shape.get("backdriven", 0.0))
         return friction[:, None]
 
     def units(self, prismatic: bool = False) -> dict[str, str]:

@@ -19,6 +19,8 @@ def test_a_gear_that_loses_only_while_it_drives(signals, columns_of):
     driving = columns_of("load_dependent_friction", signals, driving=1.0)[:, 0]
     drives = signals.load[:, 0] * signals.dq[:, 0] > 0
     np.testing.assert_array_equal(driving, np.where(drives, plain, 0.0))
+    partly = columns_of("load_dependent_friction", signals, backdriven=0.4)[:, 0]
+    np.testing.assert_array_equal(partly, np.where(drives, plain, 0.4 * plain))
 
 
 def test_a_loss_that_grows_with_load_and_speed(signals, columns_of):
