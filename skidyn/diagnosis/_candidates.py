@@ -34,6 +34,8 @@ class Candidate:
         Shape parameters that are refined; they count as parameters.
     n_parts : float
         Number of parts of the recordings among which its own was chosen.
+    n_chosen : int
+        Number of products of signals of which it was the best.
     """
 
     kind: str
@@ -42,6 +44,7 @@ class Candidate:
     variables: tuple[str, ...] = ()
     n_shapes: int = 0
     n_parts: float = 1.0
+    n_chosen: int = 1
 
     @cached_property
     def width(self) -> int:

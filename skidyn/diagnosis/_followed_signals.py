@@ -26,6 +26,7 @@ from scipy.stats import ttest_1samp
 from skidyn._signals import Array
 from skidyn.diagnosis._pursuit import Products, pursue
 from skidyn.diagnosis._variables import average_at_rows, averaged_signals
+from skidyn.effects import Factor
 from skidyn.evidence import Problem
 
 #: Most rows that are used, and most signals of a set.
@@ -45,8 +46,15 @@ ROUNDING = 1e-6
 #: A product that varies by a smaller share of its squares counts as constant.
 CONSTANT = 1e-10
 
+#: Rows of the search for products of three functions, and ratio of the mean square of successive
+#: differences to the variance (2 for white noise; von Neumann 1941, Ann. Math. Stat. 12(4)) above
+#: which a residual is left as noise by it.
+ROWS_OF_TRIPLES, NOISY = 1000, 1.8
+
 #: Joints, from 0, and the factor of the position of each.
 Sum = tuple[tuple[int, ...], tuple[float, ...]]
+#: Functions that are multiplied, and the number of products of which theirs was the best.
+Product = tuple[tuple[Factor, ...], int]
 
 
 class Followed(NamedTuple):
@@ -58,10 +66,14 @@ class Followed(NamedTuple):
         Different sets of one to three signals.
     sums : list of Sum
         The best sums of two and of three positions, each added or subtracted.
+    products : list of Product
+        The best product of two simple functions, and of three, each with the number of products of
+        which it is the best.
     """
 
     sets: list[tuple[str, ...]]
     sums: list[Sum]
+    products: list[Product]
 
 
 def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
@@ -83,12 +95,23 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     # numbered without gaps: dropped trajectories must not leave an empty quarter below
     numbers, fold = np.unique(problem.fold[joint][::step], return_inverse=True)
     if len(numbers) < 4:
-        return Followed([], [])
-    found = [*_by_trees(signals, y, fold), *_by_products(signals, y, fold)]
+        return Followed([], [], [])
+    sets, products = _by_products(signals, y, fold)
+    found = [*_by_trees(signals, y, fold), *sets]
+    close = [name for name in signals if abs(_joint_of(name) - joint) <= MOST_NEAR // 2]
+    triple = _by_triples({name: signals[name] for name in close}, y, fold, products)
+    if triple is not None:
+        products.append(triple)
+        found.append(tuple(sorted(factor.signal for factor in triple[0])))
     turning = np.flatnonzero(~problem.signals.prismatic).tolist()
     near = sorted(sorted(turning, key=lambda k: abs(k - joint))[:MOST_NEAR])
     positions = {k: signals[f"q{k + 1}"] for k in near}
-    return Followed(list(dict.fromkeys(found)), _by_sums(positions, y, fold))
+    return Followed(list(dict.fromkeys(found)), _by_sums(positions, y, fold), products)
+
+
+def _joint_of(signal: str) -> int:
+    """Joint of a signal, from 0."""
+    return int(signal.lstrip("abcdefghijklmnopqrstuvwxyz")) - 1
 
 
 def _by_sums(positions: dict[int, Array], y: Array, fold: NDArray[np.int64]) -> list[Sum]:
@@ -211,8 +234,8 @@ def _by_trees(
 
 def _by_products(
     signals: dict[str, Array], y: Array, fold: NDArray[np.int64]
-) -> list[tuple[str, ...]]:
-    """The signals of the best products of two simple functions."""
+) -> tuple[list[tuple[str, ...]], list[Product]]:
+    """The signals of the best products of two simple functions, and the best one itself."""
     pairs = _Pairs.of(signals)
     of = pairs.signal[np.array([pairs.first, pairs.second])]
 
@@ -226,7 +249,7 @@ def _by_products(
     products = pairs.products(y, fold)
     chosen, _ = pursue(products, worth=worth, longest=of.shape[1], admissible=admissible)
     if not chosen:
-        return []
+        return [], []
     columns = np.column_stack([pairs.column(k) for k in chosen])
     left = np.zeros(len(y))
     for f in np.unique(fold):
@@ -234,10 +257,64 @@ def _by_products(
         weights = np.linalg.lstsq(columns[~out], y[~out], rcond=None)[0]
         left[out] = (y[out] - columns[out] @ weights) ** 2
     if not _predictable(_by_fold(y**2, fold), _by_fold(left, fold)):
-        return []
+        return [], []
     names = list(signals)
     sets = [{names[i] for i in of[:, k] if i >= 0} for k in chosen]
-    return [tuple(sorted(sets[0])), tuple(sorted(set().union(*sets)))]
+    best = pairs.factors_of(chosen[0]), of.shape[1]
+    return [tuple(sorted(sets[0])), tuple(sorted(set().union(*sets)))], [best]
+
+
+def _by_triples(
+    signals: dict[str, Array], y: Array, fold: NDArray[np.int64], pairs: Sequence[Product]
+) -> Product | None:
+    """The best product of functions of three signals, if it predicts more than those of two."""
+    step = max(1, -(-len(y) // ROWS_OF_TRIPLES))
+    y, fold = y[::step] - y[::step].mean(), fold[::step]
+    if len(y) < 2 or not np.mean(np.diff(y) ** 2) < NOISY * np.mean(y**2):
+        return None
+    signals = {name: x[::step] for name, x in signals.items()}
+    least = WORTH * float(y @ y)
+    for pair, _ in pairs:
+        if all(factor.signal in signals for factor in pair):
+            column = np.prod([f.of(signals[f.signal]) for f in pair], axis=0)
+            column -= column.mean()
+            least += float(column @ y) ** 2 / max(float(column @ column), 1e-300)
+    factors = [
+        factor
+        for name, x in signals.items()
+        for factor in _simple_functions(name, x)
+        if factor.function in ("value", "side", "size")
+    ]
+    values = np.column_stack([f.of(signals[f.signal]) for f in factors])
+    values /= np.maximum(np.abs(values).max(axis=0), 1e-300)
+    own = np.array([f.signal for f in factors])
+    among, best, most = 0, (0, 0, 0), least
+    later = np.triu(own[:, None] != own, 1)
+    for k in range(len(factors) - 2):
+        others = later & (np.arange(len(factors)) > k)[:, None] & (own != own[k])
+        others &= (own != own[k])[:, None]
+        third = values[:, [k]]
+        along = (values * (third * y[:, None])).T @ values
+        mean = (values * third).T @ values / len(y)
+        square = (values**2 * third**2).T @ values**2 - len(y) * mean**2
+        tells = others & (square > CONSTANT * len(y))
+        gain = np.where(tells, along**2 / np.where(tells, square, 1.0), 0.0)
+        among += int(others.sum())
+        i, j = np.unravel_index(int(np.argmax(gain)), gain.shape)
+        if gain[i, j] > most:
+            most, best = float(gain[i, j]), (k, int(i), int(j))
+    if best == (0, 0, 0):
+        return None
+    column = values[:, list(best)].prod(axis=1)
+    column -= column.mean()
+    left = np.zeros(len(y))
+    for f in np.unique(fold):
+        out = fold == f
+        size = column[~out] @ y[~out] / max(float(column[~out] @ column[~out]), 1e-300)
+        left[out] = (y[out] - size * column[out]) ** 2
+    if not _predictable(_by_fold(y**2, fold), _by_fold(left, fold)):
+        return None
+    return tuple(factors[k] for k in best), among
 
 
 @dataclass(frozen=True)
@@ -257,6 +334,8 @@ class _Pairs:
         Functions of each pair: every function alone, then all pairs.
     mean : ndarray of shape (n_pairs,)
         Of each product over all rows.
+    factors : list of Factor
+        The functions, without the constant.
     """
 
     values: Array
@@ -264,11 +343,13 @@ class _Pairs:
     first: NDArray[np.int64]
     second: NDArray[np.int64]
     mean: Array
+    factors: list[Factor]
 
     @classmethod
     def of(cls, signals: dict[str, Array]) -> _Pairs:
         functions = [_simple_functions(name, x) for name, x in signals.items()]
-        values = np.column_stack([x for some in functions for x in some])
+        factors = [factor for some in functions for factor in some]
+        values = np.column_stack([f.of(signals[f.signal]) for f in factors])
         values = values / np.maximum(np.abs(values).max(axis=0), 1e-300)
         count, constant = values.shape[1], np.ones(len(values))
         first, second = np.triu_indices(count, 1)
@@ -277,7 +358,12 @@ class _Pairs:
         values = np.column_stack([values, constant])
         signal = np.repeat(np.arange(len(functions)), [len(some) for some in functions])
         mean = (values.T @ values / len(values))[first, second]
-        return cls(values, np.append(signal, -1), first, second, mean)
+        return cls(values, np.append(signal, -1), first, second, mean, factors)
+
+    def factors_of(self, k: int) -> tuple[Factor, ...]:
+        """The functions of one product."""
+        both = int(self.first[k]), int(self.second[k])
+        return tuple(self.factors[i] for i in both if i < len(self.factors))
 
     def column(self, k: int) -> Array:
         """Values of one product, shape (n_rows,)."""
@@ -312,9 +398,12 @@ class _Pairs:
         return np.asarray(third[self.first, self.second] - self.mean * y.sum())
 
 
-def _simple_functions(name: str, x: Array) -> list[Array]:
+def _simple_functions(name: str, x: Array) -> list[Factor]:
+    """Simple functions of a signal; positions are taken from the middle of their range."""
     if name.startswith("q"):
-        return [x, np.sin(x), np.cos(x), np.sin(2 * x), np.cos(2 * x)]
+        middle = float((x.min() + x.max()) / 2)
+        functions = ("value", "side", "sin", "cos", "sin2", "cos2")
+        return [Factor(name, function, middle) for function in functions]
     if name.startswith("dq"):
-        return [x, np.abs(x), np.sign(x)]
-    return [x]
+        return [Factor(name, function) for function in ("value", "size", "side")]
+    return [Factor(name, "value")]

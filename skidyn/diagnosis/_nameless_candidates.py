@@ -17,6 +17,7 @@ from skidyn.effects import (
     FunctionOfSignals,
     FunctionOfSum,
     NamelessEffect,
+    ProductOfSignals,
     Term,
     get_effect,
     nameless_kinds,
@@ -59,6 +60,7 @@ def nameless_candidates(
     followed = dict(zip(looked_at, found, strict=True))
     few = problem.few
     made: list[tuple[Term, tuple[str, ...]]] = []
+    among: dict[Term, int] = {}
     for kind in nameless_kinds():
         effect = get_effect(kind)
         assert isinstance(effect, NamelessEffect)
@@ -72,6 +74,13 @@ def nameless_candidates(
             if isinstance(effect, FunctionOfSignals):
                 sets = [names for names in followed[joint].sets if effect.admits(names)]
                 shapes = [effect.shape_of(few, names) for names in sets]
+            if isinstance(effect, ProductOfSignals):
+                products = followed[joint].products
+                shapes = [effect.shape_of(factors) for factors, _ in products]
+                among |= {
+                    Term.at(kind, joints, shape): count
+                    for shape, (_, count) in zip(shapes, products, strict=True)
+                }
             if isinstance(effect, FunctionOfSum):
                 shapes = [effect.shape_of(few, *of) for of in followed[joint].sums]
             if isinstance(effect, ClockPeriodic):
@@ -86,6 +95,6 @@ def nameless_candidates(
                 made.append((Term.at(kind, joints, shape), effect.variables(joint, shape)))
     all_rows = problem.prepare([term for term, _ in made], screening=True)
     return [
-        Candidate(UNKNOWN, term, rows, names, len(term.effect.shapes))
+        Candidate(UNKNOWN, term, rows, names, len(term.effect.shapes), n_chosen=among.get(term, 1))
         for (term, names), rows in zip(made, all_rows, strict=True)
     ]

@@ -42,6 +42,8 @@ Mask = NDArray[np.bool_]
 _Greedy = tuple[list[int], float]
 #: Number of kinds of which other forms are tried.
 FORMS_TRIED = 3
+#: Name of the group of products of signals, which are unknown functions.
+PRODUCTS = "products"
 
 
 class RankingSearch(SearchState):
@@ -146,8 +148,12 @@ class RankingSearch(SearchState):
         return [(own, -(drop - 2 * sum(c.width for c in own))) for own, drop in rough]
 
     def _screening(self, nameless: bool = True) -> list[Callable[[], _Greedy]]:
-        """One result for each kind."""
-        kinds = np.array([c.kind for c in self.pool])
+        """One result for each kind, and one for products of signals.
+
+        These have a single coefficient, so that a function that explains more seems more expensive
+        as long as the noise is not known.
+        """
+        kinds = np.array([c.kind if c.n_chosen == 1 else PRODUCTS for c in self.pool])
         within = np.array([self.is_judged_within(c) for c in self.pool], dtype=bool)
         tester = self.tester(self.chosen)
         self.drops = np.full(len(self.pool), -np.inf)
@@ -162,7 +168,7 @@ class RankingSearch(SearchState):
             looks += [
                 partial(self._greedy, screen, wanted & (kinds == kind), base, first, tester)
                 for kind in dict.fromkeys(kinds[wanted])
-                if nameless or kind != UNKNOWN
+                if nameless or kind not in (UNKNOWN, PRODUCTS)
             ]
         return looks
 
@@ -390,6 +396,7 @@ class RankingSearch(SearchState):
                 # The held-out error includes the penalty for its coefficients already, but not if
                 # other parts of the same few recordings are held out, which repeat their paths.
                 score = float(gain.sum()) - price * min(count, self.settings.nameless_price)
+                score -= sum(2 * float(np.log(c.n_chosen)) for c in candidates)
             ranking.append(Hypothesis(kind, tuple(candidates), gain, score, count, errors=after))
         return [h for h in ranking if h.score > self.settings.least_gain]
 

@@ -220,7 +220,7 @@ class SearchState:
             candidate.kind == UNKNOWN or candidate.is_further_form
         )
         tried = self.n_tests * (self.settings.nameless_tried if one_of_many else 1)
-        return tried * (1.0 if candidate is None else candidate.n_parts)
+        return tried * (1.0 if candidate is None else candidate.n_parts * candidate.n_chosen)
 
     def coarse(self) -> set[int]:
         """Joints, from 0, most of whose noise is that of positions."""

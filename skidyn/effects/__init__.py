@@ -43,6 +43,10 @@ from skidyn.effects._moments import starts as starts
 from skidyn.effects._motor_load import MotorLoadFriction as MotorLoadFriction
 from skidyn.effects._nameless import NamelessEffect as NamelessEffect
 from skidyn.effects._nameless_periodic import ClockPeriodic as ClockPeriodic
+from skidyn.effects._nameless_products import (
+    Factor as Factor,
+    ProductOfSignals as ProductOfSignals,
+)
 from skidyn.effects._nameless_signals import (
     FunctionOfSignals as FunctionOfSignals,
     FunctionOfSum as FunctionOfSum,

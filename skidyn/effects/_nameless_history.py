@@ -225,6 +225,33 @@ class FrictionAfterMotion(_OfAnyJoint):
         return np.column_stack([h * m for m in motion for h in heat])
 
 
+class TorqueOfRecentMotion(_OfAnyJoint):
+    """A torque that depends on how much a joint has moved recently: a warm sensor, a hose.
+
+    It is a sum of the speed and of its square, averaged over the recent past.
+    """
+
+    kind = "torque_of_recent_motion"
+    drawn_against = "time"
+    title = "Torque that depends on recent motion"
+    formula = r"a\,h,\quad T\,\dot h = |\dot q_k|^p - h,\ p = 1, 2"
+    coefficients = unnamed_coefficients(2 * len(_COOLING))
+    depends_on = ("dq_other",)
+    needs = ("time",)
+    softness = 2e-3
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        k = int(shape["other"])
+
+        def averaged() -> Array:
+            speed = np.abs(signals.dq[:, k])
+            powers = speed, speed**2
+            return np.column_stack([_followed(x, signals, t) for x in powers for t in _COOLING])
+
+        columns: Array = signals.once(("averaged speed", k), averaged)
+        return columns
+
+
 class TorqueOfLargestPosition(_OfAnyJoint):
     """A torque that remembers how far a joint has been: a stretched cover, a hose that was pushed.
 
@@ -386,6 +413,7 @@ HISTORY: tuple[type[NamelessEffect], ...] = (
     FunctionOfWaySinceReversal,
     FunctionOfLastReversal,
     FrictionAfterMotion,
+    TorqueOfRecentMotion,
     TorqueOfLargestPosition,
     HysteresisOverLoad,
     FunctionOfLaggingPosition,

@@ -18,6 +18,13 @@ FORMS = {
         {"dq1", "dq2"},
         "dq1 * dq2",
     ),
+    "product of three signals": (
+        4,
+        1.2,
+        lambda x: (x["q1"] - x["q1"].mean()) * (x["q2"] - x["q2"].mean()) * x["dq3"],
+        {"q1", "q2", "dq3"},
+        None,
+    ),
     "wave over the sum of three positions": (
         3,
         1.5,
@@ -37,10 +44,11 @@ FORMS = {
         {"q2", "dq2"},
         None,
     ),
+    "remembers motion": (1, 0.8, lambda x: _warmed(x, "dq2", 1.5), {"dq2"}, None),
     "bump": (2, 1.2, lambda x: np.exp(-((x["q2"] / 0.15) ** 2)), {"q2"}, None),
 }
 #: Forms for which the signals are chosen among those of six joints.
-AMONG_MANY = tuple(FORMS)[:3]
+AMONG_MANY = tuple(FORMS)[:4]
 
 #: What is hidden in one log: a form alone among six joints, and one on each of two joints.
 TOGETHER = [
@@ -49,6 +57,7 @@ TOGETHER = [
     pytest.param(("fades after a reversal", "relaxes"), marks=pytest.mark.slow),
     pytest.param(("snaps over",), marks=pytest.mark.slow),
     ("remembers a reversal",),
+    ("remembers motion",),
     pytest.param(("pushes during motion",), marks=pytest.mark.slow),
 ]
 LENGTH = {"n_trajectories": 6, "duration": 6.0}
@@ -65,6 +74,17 @@ def _since_reversal(x, name):
         turn = turns[np.maximum(np.searchsorted(turns, np.arange(len(q)), "right") - 1, 0)]
         way[rows] = np.abs(q - q[turn]) / 0.2
     return way * np.exp(1 - way)
+
+
+def _warmed(x, name, time_constant):
+    """Square of a velocity, averaged over the recent past."""
+    heat = np.zeros(len(x))
+    for _, rows in x.groupby("trajectory").indices.items():
+        power, t = x[name].to_numpy()[rows] ** 2, x["time"].to_numpy()[rows]
+        for i in range(1, len(t)):
+            now = heat[rows[i - 1]]
+            heat[rows[i]] = now + (t[i] - t[i - 1]) / time_constant * (power[i] - now)
+    return heat
 
 
 def _last_turn(x, name):

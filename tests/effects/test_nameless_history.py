@@ -115,3 +115,13 @@ def test_a_sensor_that_lags_its_load_is_a_hysteresis_of_the_torque(signals):
             at = min(max(at, torque[i] - play), torque[i] + play)
             lagging[i] = at
     np.testing.assert_allclose(torque - lagging, play * columns[:, 1], atol=1e-9)
+
+
+def test_a_torque_of_recent_motion_remains_after_it(signals):
+    effect = get_effect("torque_of_recent_motion")
+    assert effect.variables(0, {"other": 1}) == ("dq2",)
+    stops = signals.with_(dq=signals.dq * (signals.time < 2.0)[:, None])
+    columns = effect.columns(stops, 0, other=1)
+    assert (columns >= 0).all()
+    assert (columns[199:299] > 0).all()
+    assert (np.diff(columns[202:299], axis=0) < 0).all()

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Products of simple functions of signals."""
+
+import numpy as np
+
+from skidyn.effects import Factor, get_effect
+
+
+def test_a_product_multiplies_its_functions_and_names_their_signals(signals):
+    effect = get_effect("product_of_signals")
+    factors = (Factor("q1", "side", 0.1), Factor("dq2", "size"), Factor("q1", "sin2"))
+    shape = effect.shape_of(factors)
+    q, dq = signals.q[:, 0], signals.dq[:, 1]
+    expected = np.sign(q - 0.1) * np.abs(dq) * np.sin(2 * q)
+    np.testing.assert_allclose(effect.columns(signals, 0, **shape)[:, 0], expected)
+    assert effect.variables(0, shape) == ("q1", "dq2")
+
+
+def test_the_direction_of_a_velocity_is_that_of_dry_friction(signals):
+    effect = get_effect("product_of_signals")
+    shape = effect.shape_of((Factor("dq2", "side"), Factor("ddq1", "value")))
+    expected = signals.sign[:, 1] * signals.ddq[:, 0]
+    np.testing.assert_allclose(effect.columns(signals, 0, **shape)[:, 0], expected)
