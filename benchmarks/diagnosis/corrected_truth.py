@@ -3,10 +3,11 @@
 
     python benchmarks/diagnosis/corrected_truth.py DRAW [DRAW ...] --out truth.json [--as-stated]
 
-Every DRAW is a folder with ``cases`` and ``truth``. Two things are corrected. Where viscous or
+Every DRAW is a folder with ``cases`` and ``truth``. Three things are corrected. Where viscous or
 Coulomb friction is hidden, all joints have it and the base model lacks it on all of them, but the
-truth lists the joints that were drawn: it gets all of them. Logs of simulations that diverged, in
-which no joint moves by more than 0.01 rad or one moves by more than 1000 rad, are left out.
+truth lists the joints that were drawn: it gets all of them. A rotor inertia beside another effect
+is no missing effect if the base model, which is fitted, has one. Logs of simulations that diverged,
+in which no joint moves by more than 0.01 rad or one moves by more than 1000 rad, are left out.
 ``--as-stated`` corrects nothing and only joins the draws.
 """
 
@@ -32,10 +33,12 @@ def diverged(log: pd.DataFrame, n_joints: int) -> bool:
     return not LEAST < travel < MOST
 
 
-def with_friction_of_all(truth: dict) -> dict:
-    """Truth with all joints of a friction that the base model lacks on all of them."""
+def corrected(truth: dict) -> dict:
+    """Truth with all joints of a friction that the base model lacks, without what it contains."""
     effects = []
     for effect in truth["effects"]:
+        if effect["kind"] == "rotor_inertia" and "rotor_inertia" in truth["base_model"]:
+            continue
         name = FRICTION.get(effect["kind"])
         if name and effect["kind"] not in truth["base_model"]:
             size = truth["friction"][name]
@@ -62,12 +65,12 @@ def main() -> None:
             if diverged(log, len(truth["oracle_z"])):
                 left_out.append(file.stem)
                 continue
-            corrected = with_friction_of_all(truth)
-            changed += [file.stem] if corrected != truth else []
-            truth = corrected
+            right = corrected(truth)
+            changed += [file.stem] if right != truth else []
+            truth = right
         kept.append(truth)
     options.out.write_text(json.dumps(kept))
-    print(f"{len(kept)} logs; diverged: {left_out}; friction of all joints: {changed}")
+    print(f"{len(kept)} logs; diverged: {left_out}; corrected: {changed}")
 
 
 if __name__ == "__main__":

@@ -216,11 +216,11 @@ class SearchState:
         Unknown functions were also chosen among products of functions, and a further form of an
         effect among all possible forms; an effect in a part of the recordings among all parts.
         """
-        one_of_many = candidate is not None and (
-            candidate.kind == UNKNOWN or candidate.is_further_form
-        )
-        tried = self.n_tests * (self.settings.nameless_tried if one_of_many else 1)
-        return tried * (1.0 if candidate is None else candidate.n_parts * candidate.n_chosen)
+        if candidate is None:
+            return float(self.n_tests)
+        one_of_many = candidate.kind == UNKNOWN or candidate.is_further_form
+        forms = max(self.settings.nameless_tried if one_of_many else 1, candidate.n_chosen)
+        return self.n_tests * forms * candidate.n_parts
 
     def coarse(self) -> set[int]:
         """Joints, from 0, most of whose noise is that of positions."""

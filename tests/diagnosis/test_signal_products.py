@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Torques that are products of functions of several signals, which have no effect alone."""
+
+import numpy as np
+import pytest
+
+from skidyn.datasets import load_ur5, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
+from skidyn.identification import RBDRegressor
+
+SHORT = {"n_trajectories": 6, "duration": 4.0}
+
+
+def diagnosed(log, y):
+    """The motion is as it should be: no test looks at the checks of the log."""
+    return diagnose(RBDRegressor(log.robot, ("viscous", "coulomb")), log.X, y, checks=())
+
+
+def away(log, name):
+    """A position, from its middle."""
+    return log.X[name].to_numpy() - log.X[name].mean()
+
+
+@pytest.mark.parametrize(
+    ("torque", "signals"),
+    [
+        (
+            lambda log: 1.2 * away(log, "q1") * away(log, "q2") * log.X["dq3"],
+            {"q1", "q2", "dq3"},
+        ),
+        (
+            lambda log: 0.3 * np.sign(away(log, "q2")) * np.abs(log.X["dq5"]),
+            {"q2", "dq5"},
+        ),
+    ],
+    ids=["of three", "of two"],
+)
+def test_a_product_is_found_in_a_short_log(torque, signals):
+    log = make_hidden_effect_log(load_ur5(), None, random_state=11, **SHORT)
+    y = np.array(log.y, dtype=float)
+    y[:, 3] += torque(log)
+
+    diagnosis = diagnosed(log, y)
+
+    (finding,) = diagnosis.findings
+    assert (diagnosis.verdict, finding.joints) == ("unknown", (4,))
+    assert set(finding.variables) == signals
+
+
+@pytest.mark.slow
+def test_a_product_of_signals_that_do_nothing_alone_is_followed():
+    log = make_hidden_effect_log(load_ur5(), None, random_state=3, **SHORT)
+    y = np.array(log.y, dtype=float)
+    y[:, 5] += 0.05 * np.sign(log.X["dq4"]) * log.X["dq5"] + 0.05 * log.X["dq4"]
+
+    diagnosis = diagnosed(log, y)
+
+    (finding,) = diagnosis.findings
+    assert finding.joints == (6,)
+    assert set(finding.variables) == {"dq4", "dq5"}
