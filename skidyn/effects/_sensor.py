@@ -44,23 +44,40 @@ class TorqueGain(Effect):
 
 #: Share of a sampling step within which the values of a row may have been taken.
 SAME_ROW = 0.5
+#: Longest shift of a torque, s.
+LONGEST_SHIFT = 0.3
 
 
 class TimeDelay(Effect):
-    """The torque channel lags behind the motion channels."""
+    """The torque channel lags behind the motion channels.
+
+    The plain formula is of first order in the delay, and holds for any lag that is short. With a
+    ``shift`` in its shape, in s, it is the difference from the torque at this earlier time, so that
+    a ``delay`` of the same size is a pure delay.
+    """
 
     kind = "time_delay"
     drawn_against = "ddq"
     title = "Time delay of the torque"
-    formula = r"-d\,\dot\tau_\mathrm{model}"
+    formula = (
+        r"-d\,\dot\tau_\mathrm{model}\ \text{or}\ "
+        r"\tfrac{d}{s}\,(\tau_\mathrm{model}(t - s) - \tau_\mathrm{model}(t))"
+    )
     # Beyond it the first-order expansion of a delay is no longer valid.
     coefficients = (Coefficient("delay", "s", limit=0.1),)
+    shapes = (Shape("shift", "s", (), 0.01, LONGEST_SHIFT, scales=False),)
+    forms = ({"shift": 0.04},)
     needs = ("model_torque", "time")
     is_slow = True
     simplicity = 6
     rivals = ("joint_elasticity", "rotor_inertia", "viscous")
     separating_motion = "fast motion with sharp changes of torque"
     reference = "Ljung (1999), System Identification, chapter 14."
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        if "shift" in shape:
+            return (Coefficient("delay", "s", limit=LONGEST_SHIFT),)
+        return self.coefficients
 
     def sites(self, signals: Signals) -> list[tuple[int, ...]]:
         # A bus delays all joints equally; a single slow sensor delays its own joint.
@@ -84,6 +101,12 @@ class TimeDelay(Effect):
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
         assert signals.model_torque is not None
+        if "shift" in shape:
+            shift, torque = float(shape["shift"]), signals.model_torque
+            return {
+                j: (_earlier(torque[:, [j]], signals, shift) - torque[:, [j]]) / shift
+                for j in joints
+            }
         # Dry friction jumps at a reversal: its derivative is a spike that affects only the rows of
         # reversals. The lag is visible in the smooth part.
         smooth = (
@@ -91,6 +114,16 @@ class TimeDelay(Effect):
         )
         # The acceleration is noisy, and its derivative would be noise on single samples.
         return {j: -smooth_derivatives(smooth[:, [j]], signals, order=2)[1] for j in joints}
+
+
+def _earlier(x: Array, signals: Signals, shift: float) -> Array:
+    """Signals, (n_samples, 1), a time earlier; at first those of the start of the segment."""
+    assert signals.time is not None
+    y = np.empty_like(x)
+    for rows in signals.segments:
+        time = signals.time[rows]
+        y[rows, 0] = np.interp(time - shift, time, x[rows, 0])
+    return y
 
 
 #: Least share of the torque beyond the limit that a saturation removes; less is a gain that changes

@@ -50,3 +50,15 @@ def test_limits_of_both_directions_may_differ(signals, columns_of):
     shapes = [s for s in effect.grid(signals, (0,)) if "limit_below" in s]
     assert shapes
     assert all(set(effect.parameters(np.ones(1), s)) <= set(effect.units()) for s in shapes)
+
+
+def test_a_long_delay_is_a_difference_from_an_earlier_torque(signals):
+    shift, torque = 0.06, signals.model_torque
+    change = get_effect("time_delay").torque_columns(signals, (0, 1), shift=shift)
+    shifted = np.sin(3 * (signals.time - shift))
+    inner = np.r_[20:300, 320:600]
+    late = torque[:, 0] + shift * change[0][:, 0]
+    np.testing.assert_allclose(late[inner], shifted[inner], atol=2e-4)
+    short = get_effect("time_delay").torque_columns(signals, (0,), shift=1e-3)[0]
+    plain = get_effect("time_delay").torque_columns(signals, (0,))[0]
+    np.testing.assert_allclose(short[inner], plain[inner], atol=0.05)  # of one step
