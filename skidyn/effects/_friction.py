@@ -66,6 +66,24 @@ class Coulomb(Effect):
         return signals.sign[:, [joint]]
 
 
+#: Largest Stribeck velocity, as a share of the speeds of the log: a wider hump may be any function
+#: of the speed, beside viscous and dry friction.
+LOW_SPEED = 0.3
+
+
+def is_of_low_speed(speed: float, signals: Signals, joint: int) -> bool:
+    """Whether a velocity, rad/s or m/s, is small compared with those of a joint."""
+    return speed <= LOW_SPEED * highest_speed(signals, joint)
+
+
+def highest_speed(signals: Signals, joint: int) -> float:
+    """Speed of a joint that is rarely exceeded, rad/s or m/s."""
+    found: float = signals.once(
+        ("highest speed", joint), lambda: float(np.quantile(np.abs(signals.dq[:, joint]), 0.99))
+    )
+    return found
+
+
 class Stribeck(Effect):
     """Extra dry friction at low speed that fades as the lubricant film builds up.
 
@@ -88,6 +106,14 @@ class Stribeck(Effect):
     separating_motion = "constant-speed sweeps from 0.01 to 0.5 rad/s in both directions"
     reference = _ARMSTRONG
 
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        tried = super().grid(signals, joints)
+        slow = [shape for shape in tried if self.admissible(signals, joints, shape)]
+        return slow or tried[:1]
+
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        return is_of_low_speed(shape["vs"], signals, joints[0])
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         speed = np.abs(signals.dq[:, joint]) / shape["vs"]
         grown = speed ** shape["delta"]
@@ -98,6 +124,8 @@ class Stribeck(Effect):
 
 #: Range of the speed at which friction saturates, in units of the joint.
 SATURATING = (0.02, 3.0)
+#: Share of the highest speed beyond which friction is not seen to grow.
+SEEN_BEYOND = 0.7
 #: Distance from one of a power of the speed that is called viscous friction.
 NEARLY_VISCOUS = 0.1
 
@@ -162,7 +190,7 @@ class NonlinearViscous(Effect):
 
     Or it grows up to a speed, ``saturating``, as ``v (1 - exp(-|dq| / v))`` and powers of it, like
     an arctangent or a hyperbolic tangent. It does not fall with the speed then, which would be
-    Stribeck friction.
+    Stribeck friction. Oil that a gear churns from a speed on is a power of the speed ``beyond`` it.
     """
 
     kind = "nonlinear_viscous"
@@ -173,8 +201,9 @@ class NonlinearViscous(Effect):
     shapes = (
         Shape("power", "1", (0.5, 2.0, 3.0), 0.1, 4.5, scales=False, limit_kind="coulomb"),
         Shape("saturating", "rad/s", (), *SATURATING, limit_kind="coulomb"),
+        Shape("beyond", "rad/s", (), *SATURATING),
     )
-    forms = ({"saturating": 0.2}, {"saturating": 0.6})
+    forms = ({"saturating": 0.2}, {"saturating": 0.6}, {"beyond": 0.3})
     simplicity = 9
     rivals = ("viscous", "stribeck", "coulomb")
     separating_motion = "sweeps that reach the highest speed the joint allows"
@@ -182,17 +211,24 @@ class NonlinearViscous(Effect):
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
         (plain,) = self.coefficients
-        return (replace(plain, sign=1),) if "saturating" in shape else (plain,)
+        grows_only = not {"saturating", "beyond"}.isdisjoint(shape)
+        return (replace(plain, sign=1),) if grows_only else (plain,)
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         tried = super().grid(signals, joints)
-        return [s for s in tried if "saturating" not in s or s["power"] < 1.0]
+        from_a_speed_on = {"power": 2.0, "beyond": 0.3 * highest_speed(signals, joints[0])}
+        tried = [s for s in tried if "beyond" not in s]
+        tried = [s for s in tried if "saturating" not in s or s["power"] < 1.0]
+        return [*tried, from_a_speed_on] if from_a_speed_on["beyond"] > 0 else tried
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        if "beyond" in shape:
+            return bool(shape["beyond"] < SEEN_BEYOND * highest_speed(signals, joints[0]))
         viscous = "saturating" not in shape and abs(shape["power"] - 1.0) < NEARLY_VISCOUS
         return not viscous and super().admissible(signals, joints, shape)
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         speed = saturated(np.abs(signals.dq[:, joint]), shape.get("saturating"))
+        speed = np.maximum(0.0, speed - shape.get("beyond", 0.0))
         friction: Array = speed ** shape["power"] * signals.sign[:, joint]
         return friction[:, None]

@@ -7,7 +7,7 @@ the reversals are processed one by one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Effect
+from skidyn.effects._friction import is_of_low_speed
 from skidyn.effects._parameters import Coefficient, Shape
 
 
@@ -307,6 +308,15 @@ class LuGre(PathMemory):
     rivals = ("dahl", "maxwell_slip", "stribeck")
     separating_motion = "small reversals and slow constant-speed sweeps in one recording"
     reference = "Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE TAC 40(3), 419-425."
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        tried = super().grid(signals, joints)
+        slow = [shape for shape in tried if self.admissible(signals, joints, shape)]
+        return slow or tried[:1]
+
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        slow = is_of_low_speed(shape["vs"], signals, joints[0])
+        return slow and super().admissible(signals, joints, shape)
 
     def laws(self, **shape: Any) -> tuple[Law, ...]:
         return (_dahl_law(shape["presliding"]),)

@@ -2,8 +2,9 @@
 """Columns of friction against their formulas."""
 
 import numpy as np
+import pytest
 
-from skidyn.effects import Term, dahl_state
+from skidyn.effects import Term, dahl_state, get_effect
 
 
 def test_friction(signals, columns_of):
@@ -64,3 +65,24 @@ def test_friction_that_saturates_does_not_fall_with_the_speed():
     """That would be Stribeck friction."""
     term = Term("nonlinear_viscous", (1,), {"power": 1.0, "saturating": 0.2})
     assert term.lowest[0] == 0 > Term("nonlinear_viscous", (1,), {"power": 2.0}).lowest[0]
+
+
+@pytest.mark.parametrize("kind", ["stribeck", "lugre"])
+def test_a_hump_over_much_of_the_speeds_is_no_friction_of_low_speed(signals, kind):
+    effect, shape = get_effect(kind), {"presliding": 0.01, "delta": 2.0}
+    highest = np.quantile(np.abs(signals.dq[:, 0]), 0.99)
+    assert effect.admissible(signals, (0,), shape | {"vs": 0.2 * highest})
+    assert not effect.admissible(signals, (0,), shape | {"vs": 0.4 * highest})
+    slow = signals.with_(dq=1e-2 * signals.dq)
+    assert len(effect.grid(slow, (0,))) == 1  # a model that asks for it can be fitted
+
+
+def test_friction_may_grow_from_a_speed_on(signals, columns_of):
+    dq = signals.dq[:, 0]
+    churned = columns_of("nonlinear_viscous", signals, power=1.5, beyond=0.3)[:, 0]
+    expected = np.maximum(np.abs(dq) - 0.3, 0.0) ** 1.5 * np.sign(dq)
+    np.testing.assert_allclose(churned, expected, atol=1e-12)
+    effect = get_effect("nonlinear_viscous")
+    (shape,) = (s for s in effect.grid(signals, (0,)) if "beyond" in s)
+    assert effect.admissible(signals, (0,), shape)
+    assert not effect.admissible(signals, (0,), shape | {"beyond": np.abs(dq).max()})
