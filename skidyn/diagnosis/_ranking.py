@@ -269,18 +269,21 @@ class RankingSearch(SearchState):
         """A payload, in the other recordings if its mass is negative in these.
 
         The identified bodies contain what most recordings carry, so that both explain equally much.
+        One without a mass is that of fewer recordings.
         """
         if not candidate.term.effect.grows or candidate.term.trajectories is None:
             return candidate
-        tester = self.tester(self.chosen)
-        if tester.test(candidate.rows).coefficients[0] >= 0:
-            return candidate
-        names = self.problem.rows.recordings
+        tester, names = self.tester(self.chosen), self.problem.rows.recordings
         free = ~recordings_with(candidate.kind, [*self.chosen, candidate], names)
         rest = tuple(names[free].tolist())
+        size = tester.test(candidate.rows).coefficients
+        fewer = 0 < len(rest) < len(candidate.term.trajectories)
+        if size[0] >= 0 and not (fewer and candidate.allows(-size)):
+            return candidate
         term = candidate.term.with_shape(trajectories=rest)
         other = replace(candidate, term=term, rows=self.problem.term_rows(term))
-        return other if tester.test(other.rows).coefficients[0] > 0 else candidate
+        carries = tester.test(other.rows).coefficients
+        return other if carries[0] > 0 or (fewer and other.allows(carries)) else candidate
 
     def _parts(self) -> list[list[Candidate]]:
         """Effects of a part of the recordings, those that may be possible."""

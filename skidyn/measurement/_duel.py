@@ -29,7 +29,7 @@ from skidyn.measurement._near_bodies import (
 from skidyn.measurement._reading import Reading
 
 #: Number of effects that are examined in detail.
-FINALISTS = 4
+FINALISTS = 5
 #: Penalty of each parameter of an effect in log-likelihood: half the logarithm of some 150 rows.
 COST = 2.5
 
