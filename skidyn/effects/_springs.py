@@ -111,6 +111,7 @@ class NonlinearSpring(Effect):
         {"low": 0.5, "high": 0.9},
         {"rest": 0.3, "power": 5.0},
         {"rest": 0.5, "power": 5.0},
+        {"rest": 0.5, "power": 2.0},
         {"rest": 0.7, "power": 5.0},
         {"rest": 0.5, "scale": 0.3},
     )
