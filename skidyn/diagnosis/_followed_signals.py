@@ -40,7 +40,8 @@ MOST_ROWS = 2000
 TREES = (15, 50)
 #: A signal counts if shuffling it increases the error by this share of that of the strongest one.
 COUNTS = 0.1
-#: Number of nearest joints among which sums of positions are formed, and their waves per rad.
+#: Number of nearest joints among which sums of positions and products of three signals are formed,
+#: and waves of the sums per rad.
 MOST_NEAR, WAVES, SIGNS = 8, (0.5, 1.0, 2.0), (1.0, -1.0)
 #: Relative rounding error of a sum.
 ROUNDING = 1e-6
@@ -90,8 +91,9 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
         return Followed([], [], [])
     sets, products = products_of_two(signals, y, fold)
     found = [*_by_trees(signals, y, fold), *sets]
-    close = [name for name in signals if abs(_joint_of(name) - joint) <= MOST_NEAR // 2]
-    triple = product_of_three({name: signals[name] for name in close}, y, fold, products)
+    nearest = sorted(range(problem.n_joints), key=lambda k: abs(k - joint))[:MOST_NEAR]
+    close = {name: x for name, x in signals.items() if _joint_of(name) in nearest}
+    triple = product_of_three(close, y, fold, products)
     if triple is not None:
         products.append(triple)
         found.append(tuple(sorted(factor.signal for factor in triple[0])))
