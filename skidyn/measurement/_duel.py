@@ -28,8 +28,9 @@ from skidyn.measurement._near_bodies import (
 )
 from skidyn.measurement._reading import Reading
 
-#: Number of effects that are examined in detail.
-FINALISTS = 5
+#: Number of effects that are examined in detail against a reading, and against a change of a single
+#: joint, for which fewer effects are possible.
+FINALISTS, OF_ONE_JOINT = 5, 4
 #: Penalty of each parameter of an effect in log-likelihood: half the logarithm of some 150 rows.
 COST = 2.5
 
@@ -134,7 +135,8 @@ def left_by_effects(fits: Fits, joint: int, rows: NDArray[np.bool_]) -> tuple[fl
     here = NearBodies(fits, reading, gains, fits.identified(reading).inflation)
     k = here.joints.index(joint)
     own = rows[here.rows[k]]
-    effects = [*_likely(here, [joint]), *_likely(here, [joint], rows)]
+    everywhere, there = _likely(here, [joint]), _likely(here, [joint], rows)
+    effects = [*everywhere[:OF_ONE_JOINT], *there[:OF_ONE_JOINT]]
     fits_of = [here.plain, *(here.fit(columns) for _, columns, _ in effects)]
     left = [float(np.sqrt(np.mean(fit.residuals[k][own] ** 2))) for fit in fits_of]
     scaled = [x / fit.scales[k] for x, fit in zip(left, fits_of, strict=True)]
@@ -164,7 +166,7 @@ def gained_over_effects(fits: Fits, mended: Fits, joint: int, rows: NDArray[np.b
         NearBodies(f, reading, np.nan_to_num(f.nominal(reading).gain), inflation)
         for f in (fits, mended)
     )
-    effects = _likely(here, [joint], rows)
+    effects = _likely(here, [joint], rows)[:OF_ONE_JOINT]
     rivals = [here.fit(columns).posterior - cost for _, columns, cost in effects]
     return there.plain.posterior - max(rivals, default=here.plain.posterior)
 
