@@ -71,6 +71,14 @@ class Coulomb(Effect):
 LOW_SPEED = 0.3
 
 
+def of_low_speed(
+    shapes: Sequence[dict[str, Any]], signals: Signals, joint: int
+) -> list[dict[str, Any]]:
+    """Shapes with a Stribeck velocity ``vs`` that is low for a joint, or the first one."""
+    slow = [shape for shape in shapes if is_of_low_speed(shape["vs"], signals, joint)]
+    return slow or list(shapes[:1])
+
+
 def is_of_low_speed(speed: float, signals: Signals, joint: int) -> bool:
     """Whether a velocity, rad/s or m/s, is small compared with those of a joint."""
     return speed <= LOW_SPEED * highest_speed(signals, joint)
@@ -107,9 +115,7 @@ class Stribeck(Effect):
     reference = _ARMSTRONG
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        tried = super().grid(signals, joints)
-        slow = [shape for shape in tried if self.admissible(signals, joints, shape)]
-        return slow or tried[:1]
+        return of_low_speed(super().grid(signals, joints), signals, joints[0])
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         return is_of_low_speed(shape["vs"], signals, joints[0])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Effect
-from skidyn.effects._friction import is_of_low_speed
+from skidyn.effects._friction import is_of_low_speed, of_low_speed
 from skidyn.effects._parameters import Coefficient, Shape
 
 
@@ -310,9 +310,7 @@ class LuGre(PathMemory):
     reference = "Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE TAC 40(3), 419-425."
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        tried = super().grid(signals, joints)
-        slow = [shape for shape in tried if self.admissible(signals, joints, shape)]
-        return slow or tried[:1]
+        return of_low_speed(super().grid(signals, joints), signals, joints[0])
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         slow = is_of_low_speed(shape["vs"], signals, joints[0])

@@ -129,8 +129,6 @@ def _earlier(x: Array, signals: Signals, shift: float) -> Array:
 #: Least share of the torque beyond the limit that a saturation removes; less is a gain that changes
 #: with the torque.
 LEAST_CUT = 0.3
-
-
 #: Quantiles of the torque that are tried as its limit: rare peaks are far above it.
 CUT_OFF = (0.98, 0.92)
 
