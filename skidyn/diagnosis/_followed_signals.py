@@ -16,6 +16,7 @@ References
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -91,16 +92,20 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
         return Followed([], [], [])
     sets, products = products_of_two(signals, y, fold)
     found = [*_by_trees(signals, y, fold), *sets]
-    nearest = sorted(range(problem.n_joints), key=lambda k: abs(k - joint))[:MOST_NEAR]
+    nearest = _nearest(joint, range(problem.n_joints))
     close = {name: x for name, x in signals.items() if _joint_of(name) in nearest}
     triple = product_of_three(close, y, fold, products)
     if triple is not None:
         products.append(triple)
         found.append(tuple(sorted(factor.signal for factor in triple[0])))
     turning = np.flatnonzero(~problem.signals.prismatic).tolist()
-    near = sorted(sorted(turning, key=lambda k: abs(k - joint))[:MOST_NEAR])
-    positions = {k: signals[f"q{k + 1}"] for k in near}
+    positions = {k: signals[f"q{k + 1}"] for k in sorted(_nearest(joint, turning))}
     return Followed(list(dict.fromkeys(found)), _by_sums(positions, y, fold), products)
+
+
+def _nearest(joint: int, joints: Iterable[int]) -> list[int]:
+    """Those of some joints, from 0, that are nearest to one, nearest first."""
+    return sorted(joints, key=lambda k: abs(k - joint))[:MOST_NEAR]
 
 
 def _joint_of(signal: str) -> int:
