@@ -272,10 +272,12 @@ class Signals:
     def named(self, name: str) -> Array:
         """A signal by its name, joints counted from 1: ``"dq3"``, ``"temp2"``, ``"time"``, ...
 
-        ``"tau3"`` is the torque of the model.
+        ``"tau3"`` is the torque of the model, ``"trajectory"`` the number of the recording.
         """
         if name == "time":
             return self.clock
+        if name == "trajectory":
+            return self.trajectory.astype(float)
         kind = name.rstrip("0123456789")
         table = getattr(self, {"temp": "temperature", "tau": "model_torque"}.get(kind, kind))
         assert table is not None

@@ -248,7 +248,10 @@ def make_finding(
         code = "model = diagnosis.model"
     else:
         code = f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'
-    sentence = f"{told_briefly(title, joints, term.trajectories, parameters)}. "
+    some = term.trajectories
+    if some is not None and len(some) == len(problem.rows.recordings):
+        some = None  # in every recording, with a size of its own
+    sentence = f"{told_briefly(title, joints, some, parameters)}. "
     sentence += f"It {spans_told(term.spans)}. " if term.spans else ""
     sentence += f"It {course_told(term)}. " if term.course else ""
     sentence += _fall_told(error_drop)

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
+from skidyn.diagnosis._changing_sizes import changing_size
 from skidyn.diagnosis._signal_products import (
     LEAST_SHARE,
     MOST_SIGNALS,
@@ -63,11 +64,14 @@ class Followed(NamedTuple):
     products : list of Product
         The best product of two simple functions, and of three, each with the number of products of
         which it is the best.
+    changing : list of Product
+        The best function of a signal with a size of its own in each recording.
     """
 
     sets: list[tuple[str, ...]]
     sums: list[Sum]
     products: list[Product]
+    changing: list[Product]
 
 
 def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
@@ -86,10 +90,13 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     step = max(1, -(-len(y) // MOST_ROWS))
     signals = {name: x[::step] for name, x in averaged_signals(problem, joint).items()}
     y = y[::step]
+    recording, quarter = (of[joint][::step] for of in (problem.rows.trajectory, problem.rows.quarter))
+    own = changing_size(signals, y, recording, quarter)
+    changing = [] if own is None else [own]
     # numbered without gaps: dropped trajectories must not leave an empty quarter below
     numbers, fold = np.unique(problem.fold[joint][::step], return_inverse=True)
     if len(numbers) < 4:
-        return Followed([], [], [])
+        return Followed([], [], [], changing)
     sets, products = products_of_two(signals, y, fold)
     found = [*_by_trees(signals, y, fold), *sets]
     nearest = _nearest(joint, range(problem.n_joints))
@@ -100,7 +107,7 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
         found.append(tuple(sorted(factor.signal for factor in triple[0])))
     turning = np.flatnonzero(~problem.signals.prismatic).tolist()
     positions = {k: signals[f"q{k + 1}"] for k in sorted(_nearest(joint, turning))}
-    return Followed(list(dict.fromkeys(found)), _by_sums(positions, y, fold), products)
+    return Followed(list(dict.fromkeys(found)), _by_sums(positions, y, fold), products, changing)
 
 
 def _nearest(joint: int, joints: Iterable[int]) -> list[int]:

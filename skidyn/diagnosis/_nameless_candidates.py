@@ -18,6 +18,7 @@ from skidyn.effects import (
     FunctionOfSum,
     NamelessEffect,
     ProductOfSignals,
+    SizeByRecording,
     Term,
     get_effect,
     nameless_kinds,
@@ -74,9 +75,13 @@ def nameless_candidates(
             if isinstance(effect, FunctionOfSignals):
                 sets = [names for names in followed[joint].sets if effect.admits(names)]
                 shapes = [effect.shape_of(few, names) for names in sets]
-            if isinstance(effect, ProductOfSignals):
-                products = followed[joint].products
-                shapes = [effect.shape_of(factors) for factors, _ in products]
+            if isinstance(effect, ProductOfSignals | SizeByRecording):
+                if isinstance(effect, ProductOfSignals):
+                    products = followed[joint].products
+                    shapes = [effect.shape_of(factors) for factors, _ in products]
+                else:
+                    products, names = followed[joint].changing, problem.rows.recordings.tolist()
+                    shapes = [effect.shape_of(factor, names) for (factor,), _ in products]
                 among |= {
                     Term.at(kind, joints, shape): count
                     for shape, (_, count) in zip(shapes, products, strict=True)

@@ -122,7 +122,7 @@ def product_of_three(
     factors = [
         factor
         for name, x in signals.items()
-        for factor in _simple_functions(name, x)
+        for factor in simple_functions(name, x)
         if factor.function in ("value", "side", "size")
     ]
     values = np.column_stack([factor.of(signals[factor.signal]) for factor in factors])
@@ -210,7 +210,7 @@ class _Pairs:
 
     @classmethod
     def of(cls, signals: dict[str, Array]) -> _Pairs:
-        functions = [_simple_functions(name, x) for name, x in signals.items()]
+        functions = [simple_functions(name, x) for name, x in signals.items()]
         factors = [factor for some in functions for factor in some]
         values = np.column_stack([f.of(signals[f.signal]) for f in factors])
         values = values / np.maximum(np.abs(values).max(axis=0), 1e-300)
@@ -261,8 +261,16 @@ class _Pairs:
         return np.asarray(third[self.first, self.second] - self.mean * y.sum())
 
 
-def _simple_functions(name: str, x: Array) -> list[Factor]:
-    """Simple functions of a signal; positions are taken from the middle of their range."""
+def simple_functions(name: str, x: Array) -> list[Factor]:
+    """Simple functions of a signal; positions are taken from the middle of their range.
+
+    Parameters
+    ----------
+    name : str
+        Signal, joints counted from 1.
+    x : ndarray of shape (n_rows,)
+        Its values.
+    """
     if name.startswith("q"):
         middle = float((x.min() + x.max()) / 2)
         functions = ("value", "side", "sin", "cos", "sin2", "cos2")

@@ -115,9 +115,10 @@ def describe_unknowns(
         effect = term.effect
         assert isinstance(effect, NamelessEffect)
         guessed = effect.variables(term.places[0], dict(term.shape))
-        if "robot" in effect.needs:  # the position of the tool is not one of the signals
+        # the position of the tool, and the recording, are not among the signals that are tested
+        if "robot" in effect.needs or "trajectory" in guessed:
             for joint in term.places:
-                own = (f"q{joint + 1}",)
+                own = guessed if "trajectory" in guessed else (f"q{joint + 1}",)
                 shape = _shape(problem, term, joint, whole[span], left[:, span], own)
                 found.append(UnknownTorque(joint + 1, guessed, (), shape, None))
             continue

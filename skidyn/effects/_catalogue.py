@@ -27,7 +27,7 @@ from skidyn.effects._nameless import NAMELESS
 from skidyn.effects._nameless_coupled import COUPLED
 from skidyn.effects._nameless_history import HISTORY
 from skidyn.effects._nameless_periodic import PERIODIC
-from skidyn.effects._nameless_products import ProductOfSignals
+from skidyn.effects._nameless_products import PRODUCTS
 from skidyn.effects._nameless_signals import OF_SIGNALS
 from skidyn.effects._nameless_tool import AT_TOOL
 from skidyn.effects._position import PositionDependentFriction, TorqueRipple
@@ -76,7 +76,7 @@ _CLASSES: tuple[type[Effect], ...] = (
     *MOTOR_LOAD,
     *SERVO,
 )
-_NAMELESS = (*NAMELESS, *OF_SIGNALS, ProductOfSignals, *PERIODIC, *HISTORY, *AT_TOOL, *COUPLED)
+_NAMELESS = (*NAMELESS, *OF_SIGNALS, *PRODUCTS, *PERIODIC, *HISTORY, *AT_TOOL, *COUPLED)
 for _cls in (*_CLASSES, *_NAMELESS, AccelerationNoise, Formula):
     register_effect(_cls)
 

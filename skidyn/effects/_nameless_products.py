@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An unknown torque as a product of simple functions of signals of any joints."""
+"""Unknown torques as products of simple functions of signals, or of a function and a size."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
+from skidyn.effects._parameters import Coefficient
 
 
 class Factor(NamedTuple):
@@ -74,9 +75,63 @@ class ProductOfSignals(NamelessEffect):
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         product = np.ones(signals.n_samples)
         for factor in map(Factor, shape["of"], shape["functions"], shape["middle"]):
-            name = factor.signal
-            if name.startswith("dq") and factor.function == "side":
-                product = product * signals.sign[:, int(name[2:]) - 1]
-            else:
-                product = product * factor.of(signals.named(name))
+            product = product * _values(signals, factor)
         return product[:, None]
+
+
+class SizeByRecording(NamelessEffect):
+    """A simple function of a signal with a size of its own in every recording.
+
+    A torque that another wiring, grip or amplifier range changes from one recording to the next,
+    even to the opposite sign. It is 0 in recordings that the log does not contain.
+    """
+
+    kind = "size_by_recording"
+    title = "Function of a signal, of another size in each recording"
+    formula = r"c_k\,f(s)"
+    coefficients = unnamed_coefficients(1)
+    search = "screened"
+    is_of_one_number = True
+
+    def words(self, shape: Mapping[str, Any]) -> str:
+        return f"Unknown torque that depends on {shape['of']}, of another size in each recording,"
+
+    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
+        return (shape["of"], "trajectory")
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        return []
+
+    def shape_of(self, factor: Factor, recordings: Sequence[int]) -> dict[str, Any]:
+        """Shape of a function of a signal in some recordings.
+
+        Parameters
+        ----------
+        factor : Factor
+            The function.
+        recordings : sequence of int
+            Numbers of the trajectories.
+        """
+        of, function, middle = factor
+        own = tuple(recordings)
+        shape = {"of": of, "function": function, "middle": middle, "recordings": own}
+        return {**shape, "trajectories": own}
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        return unnamed_coefficients(len(shape.get("recordings", (0,))))
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        factor = Factor(shape["of"], shape["function"], shape["middle"])
+        here = signals.trajectory[:, None] == np.array(shape["recordings"])
+        return np.where(here, _values(signals, factor)[:, None], 0.0)
+
+
+def _values(signals: Signals, factor: Factor) -> Array:
+    """Values of a factor at every sample; the direction of a velocity is that of dry friction."""
+    name = factor.signal
+    if name.startswith("dq") and factor.function == "side":
+        return np.asarray(signals.sign[:, int(name[2:]) - 1])
+    return factor.of(signals.named(name))
+
+
+PRODUCTS: tuple[type[NamelessEffect], ...] = (ProductOfSignals, SizeByRecording)
