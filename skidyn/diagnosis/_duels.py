@@ -16,6 +16,7 @@ from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
     margin_over,
+    on_pairs,
     on_single_joints,
     ranked_with,
     rivals_among,
@@ -33,7 +34,8 @@ class DuellingSearch(JudgingSearch):
         One effect on all joints explains more than another one on each, so that it may also be
         chosen for a joint on which it only resembles the right one. There, the rule for the choice
         is applied to this joint alone. Joints of one robot have the same design: another effect
-        must explain more than the common one.
+        must explain more than the common one. A coupling of several pairs is compared with effects
+        of the single joints of each pair, which it resembles if its ratio is large.
 
         Parameters
         ----------
@@ -45,7 +47,8 @@ class DuellingSearch(JudgingSearch):
         Hypothesis
             The effect on at least one of its joints, with what its terms were compared with.
         """
-        if len(best.candidates) < 2 or not on_single_joints(best):
+        apart = on_single_joints(best)
+        if len(best.candidates) < 2 or not (apart or on_pairs(best)):
             return best
         kept, alone, lost = [], [], []
         for candidate in best.candidates:
@@ -58,7 +61,7 @@ class DuellingSearch(JudgingSearch):
                 continue
             margin = margin_over(own, rivals_among(own, ranking))
             compared = ranked_with(replace(own, margin=margin), ranking)
-            if other.kind == best.kind or not self._explains_more(other, own):
+            if other.kind == best.kind or (apart and not self._explains_more(other, own)):
                 kept.append(candidate)
                 alone.append(compared)
             else:
@@ -102,12 +105,14 @@ class DuellingSearch(JudgingSearch):
             self.chosen = chosen
 
     def _rivals_alone(self, kind: str, candidate: Candidate) -> list[Hypothesis]:
-        """A term and other known effects on its joint, best first; empty without others."""
+        """A term and other known effects on its joints, best first; empty without others."""
+        joints = set(candidate.joints)
         found = self.strongest(
-            lambda c: c.kind, lambda c: c.joints == candidate.joints and c.kind != UNKNOWN
+            lambda c: (c.kind, c.joints), lambda c: joints.issuperset(c.joints) and c.kind != UNKNOWN
         )
         drops = {id(c): drop for c, drop in zip(self.pool, self.drops, strict=True)}
-        least = COMPARABLE * drops[id(found.pop(kind))] if kind in found else np.inf
+        own = found.pop((kind, candidate.joints), None)
+        least = np.inf if own is None else COMPARABLE * drops[id(own)]
         near = [c for c in found.values() if drops[id(c)] > least]
         near = sorted(near, key=lambda c: -drops[id(c)])[: self.settings.refined]
         if not near:

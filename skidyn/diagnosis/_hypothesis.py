@@ -200,10 +200,19 @@ def rivals_among(best: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypoth
 
 def on_single_joints(hypothesis: Hypothesis) -> bool:
     """Whether it is a known effect on single joints, found on rows of all recordings."""
+    return _acts_on(hypothesis, "joint")
+
+
+def on_pairs(hypothesis: Hypothesis) -> bool:
+    """Whether it is a coupling of pairs of joints, found on rows of all recordings."""
+    return _acts_on(hypothesis, "pair")
+
+
+def _acts_on(hypothesis: Hypothesis, scope: str) -> bool:
     if hypothesis.kind == UNKNOWN or within_recordings(hypothesis):
         return False
     effect = get_effect(hypothesis.kind)
-    return hypothesis.torque is None and effect.scope == "joint" and effect.search == "grid"
+    return hypothesis.torque is None and effect.scope == scope and effect.search == "grid"
 
 
 def is_plain_friction(hypothesis: Hypothesis) -> bool:

@@ -34,6 +34,7 @@ from skidyn.diagnosis._rule import (
     CHANGE_SHARE,
     GUESS,
     LITTLE,
+    LITTLE_NAMELESS,
     MUCH,
     SURE_OF_LITTLE,
     UNLIKELY,
@@ -248,7 +249,8 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
                 likely = of_significant(likely, min(f.q_value or 0.0 for f in of_kind))
             equalled = bool(finding.rivals) and finding.margin < ABOVE
             likely *= (1 + finding.alike + equalled) * (1 + len(finding.elsewhere))
-        little = LITTLE * _share_of_samples(diagnosis.problem, finding.trajectories)
+        little = LITTLE if finding.kind != UNKNOWN else LITTLE_NAMELESS
+        little *= _share_of_samples(diagnosis.problem, finding.trajectories)
         if drop < little and likely < SURE_OF_LITTLE:
             return False
         return likely >= GUESS or finding.error_drop >= GUESS
