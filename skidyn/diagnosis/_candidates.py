@@ -35,7 +35,7 @@ class Candidate:
     n_parts : float
         Number of parts of the recordings among which its own was chosen.
     n_chosen : int
-        Number of products of signals of which it was the best.
+        Number of products, or of functions of signals, of which it was the best.
     """
 
     kind: str

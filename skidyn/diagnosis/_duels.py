@@ -108,7 +108,8 @@ class DuellingSearch(JudgingSearch):
         """A term and other known effects on its joints, best first; empty without others."""
         joints = set(candidate.joints)
         found = self.strongest(
-            lambda c: (c.kind, c.joints), lambda c: joints.issuperset(c.joints) and c.kind != UNKNOWN
+            lambda c: (c.kind, c.joints),
+            lambda c: joints.issuperset(c.joints) and c.kind != UNKNOWN,
         )
         drops = {id(c): drop for c, drop in zip(self.pool, self.drops, strict=True)}
         own = found.pop((kind, candidate.joints), None)

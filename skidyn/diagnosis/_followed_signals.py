@@ -90,7 +90,9 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     step = max(1, -(-len(y) // MOST_ROWS))
     signals = {name: x[::step] for name, x in averaged_signals(problem, joint).items()}
     y = y[::step]
-    recording, quarter = (of[joint][::step] for of in (problem.rows.trajectory, problem.rows.quarter))
+    recording, quarter = (
+        of[joint][::step] for of in (problem.rows.trajectory, problem.rows.quarter)
+    )
     own = changing_size(signals, y, recording, quarter)
     changing = [] if own is None else [own]
     # numbered without gaps: dropped trajectories must not leave an empty quarter below

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import Any
 
 from skidyn._cores import each
 from skidyn._signals import Array
@@ -59,47 +60,51 @@ def nameless_candidates(
 
     found = each(follow, looked_at)
     followed = dict(zip(looked_at, found, strict=True))
-    few = problem.few
-    made: list[tuple[Term, tuple[str, ...]]] = []
-    among: dict[Term, int] = {}
+    made: list[tuple[Term, tuple[str, ...], int]] = []
     for kind in nameless_kinds():
         effect = get_effect(kind)
         assert isinstance(effect, NamelessEffect)
-        for joints in effect.sites(few):
+        for joints in effect.sites(problem.few):
             joint = joints[0]
-            if effect.search == "spectrum" or effect.not_shown(few, joint):
+            if effect.search == "spectrum" or effect.not_shown(problem.few, joint):
                 continue
             if followed_on is not None and (effect.search != "screened" or joint not in followed):
                 continue
-            shapes = effect.grid(few, joints)
-            if isinstance(effect, FunctionOfSignals):
-                sets = [names for names in followed[joint].sets if effect.admits(names)]
-                shapes = [effect.shape_of(few, names) for names in sets]
-            if isinstance(effect, ProductOfSignals | SizeByRecording):
-                if isinstance(effect, ProductOfSignals):
-                    products = followed[joint].products
-                    shapes = [effect.shape_of(factors) for factors, _ in products]
-                else:
-                    products, names = followed[joint].changing, problem.rows.recordings.tolist()
-                    shapes = [effect.shape_of(factor, names) for (factor,), _ in products]
-                among |= {
-                    Term.at(kind, joints, shape): count
-                    for shape, (_, count) in zip(shapes, products, strict=True)
-                }
-            if isinstance(effect, FunctionOfSum):
-                shapes = [effect.shape_of(few, *of) for of in followed[joint].sums]
-            if isinstance(effect, ClockPeriodic):
-                shapes = slow_lines(
-                    problem.signals,
-                    residual[:, joint],
-                    effect.carriers(problem.signals, joint),
-                    problem.rows.sliding[:, joint],
-                    (LOWEST, SLOWEST),
-                )
-            for shape in shapes:
-                made.append((Term.at(kind, joints, shape), effect.variables(joint, shape)))
-    all_rows = problem.prepare([term for term, _ in made], screening=True)
+            for shape, among in _shapes(problem, effect, joints, residual, followed[joint]):
+                made.append((Term.at(kind, joints, shape), effect.variables(joint, shape), among))
+    all_rows = problem.prepare([term for term, *_ in made], screening=True)
     return [
-        Candidate(UNKNOWN, term, rows, names, len(term.effect.shapes), n_chosen=among.get(term, 1))
-        for (term, names), rows in zip(made, all_rows, strict=True)
+        Candidate(UNKNOWN, term, rows, names, len(term.effect.shapes), n_chosen=among)
+        for (term, names, among), rows in zip(made, all_rows, strict=True)
     ]
+
+
+def _shapes(
+    problem: Problem,
+    effect: NamelessEffect,
+    joints: tuple[int, ...],
+    residual: Array,
+    followed: Followed,
+) -> list[tuple[dict[str, Any], int]]:
+    """Shapes of an effect that are tried, each with the number among which it was chosen."""
+    few = problem.few
+    if isinstance(effect, ProductOfSignals):
+        return [(effect.shape_of(factors), among) for factors, among in followed.products]
+    if isinstance(effect, SizeByRecording):
+        names = problem.rows.recordings.tolist()
+        return [(effect.shape_of(of, names), among) for (of,), among in followed.changing]
+    if isinstance(effect, FunctionOfSignals):
+        shapes = [effect.shape_of(few, names) for names in followed.sets if effect.admits(names)]
+    elif isinstance(effect, FunctionOfSum):
+        shapes = [effect.shape_of(few, *of) for of in followed.sums]
+    elif isinstance(effect, ClockPeriodic):
+        shapes = slow_lines(
+            problem.signals,
+            residual[:, joints[0]],
+            effect.carriers(problem.signals, joints[0]),
+            problem.rows.sliding[:, joints[0]],
+            (LOWEST, SLOWEST),
+        )
+    else:
+        shapes = effect.grid(few, joints)
+    return [(shape, 1) for shape in shapes]

@@ -35,7 +35,7 @@ from skidyn.diagnosis._spans import FOLLOWS_ANY, span_candidates
 from skidyn.diagnosis._spectrum import Line, find_lines, find_vibrations
 from skidyn.diagnosis._split import recordings_with, split_effects
 from skidyn.diagnosis._tester import Tester
-from skidyn.effects import get_effect
+from skidyn.effects import SizeByRecording, get_effect
 
 Mask = NDArray[np.bool_]
 #: Indices in the pool of the added candidates, and the reduction of the held-out error.
@@ -64,9 +64,19 @@ class RankingSearch(SearchState):
         ranking += self._finals([*spans, *courses], refined=0)
         ranking += self._other_forms(ranking)
         # The least specific explanations are last: differences between recordings, and vibration.
-        return sorted(
-            ranking, key=lambda h: (says_little(h) or self._holds_in_all(h, ranking), -h.score)
-        )
+        return sorted(ranking, key=lambda h: (self._is_last(h, ranking), -h.score))
+
+    def _is_last(self, own: Hypothesis, ranking: Sequence[Hypothesis]) -> bool:
+        """Whether any other possible explanation is more specific.
+
+        A function of a signal with another size in each recording is one that explains much more
+        than what is equal in all of them, or acts in some.
+        """
+        if any(isinstance(c.term.effect, SizeByRecording) for c in own.candidates):
+            least = self.settings.recordings_share * own.score
+            others = [h for h in ranking if h is not own and set(own.joints) & set(h.joints)]
+            return any(h.score > least for h in others)
+        return says_little(own) or self._holds_in_all(own, ranking)
 
     def _other_forms(self, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Other forms of the best kinds, if their residual is not noise.

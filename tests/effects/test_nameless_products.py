@@ -21,3 +21,16 @@ def test_the_direction_of_a_velocity_is_that_of_dry_friction(signals):
     shape = effect.shape_of((Factor("dq2", "side"), Factor("ddq1", "value")))
     expected = signals.sign[:, 1] * signals.ddq[:, 0]
     np.testing.assert_allclose(effect.columns(signals, 0, **shape)[:, 0], expected)
+
+
+def test_a_function_has_another_size_in_each_recording_and_none_in_others(signals):
+    effect = get_effect("size_by_recording")
+    names = np.unique(signals.trajectory)[:2].tolist()
+    shape = effect.shape_of(Factor("q2", "value", 0.3), names)
+    columns = effect.columns(signals, 0, **shape)
+    assert columns.shape[1] == len(effect.coefficients_of(shape)) == len(names)
+    for column, name in zip(columns.T, names, strict=True):
+        here = signals.trajectory == name
+        np.testing.assert_allclose(column[here], signals.q[here, 1] - 0.3)
+        assert not column[~here].any()
+    assert effect.variables(0, shape) == ("q2", "trajectory")
