@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -21,8 +22,9 @@ from skidyn.measurement._duel import duel_of
 from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._near_bodies import LOOSE, ExtraColumns, Factored, NearBodies
+from skidyn.measurement._peak import climb
 from skidyn.measurement._reading import Reading
-from skidyn.measurement._suspicion import Suspicion
+from skidyn.measurement._suspicion import Suspicion, remedy_of
 from skidyn.measurement._torque import readable_fits
 from skidyn.robots import Robot
 
@@ -39,6 +41,9 @@ LEAST_LENGTH, SLOPE = 1e-3, 1e-3
 #: effect is there that takes most of their place, and with any bodies; and the first of these if
 #: positions are coarse, because errors of the accelerations are then not white.
 LEAST, CONFIRMED, LEAST_COARSE = 25.0, 3.0, 100.0
+#: First and last step in which another zero, rad, and scale, as a logarithm, of the positions of a
+#: joint are searched.
+ZERO_STEPS, SIZE_STEPS = (np.deg2rad(16), np.deg2rad(1.5)), (0.24, 0.025)
 #: Least error of a length to be reported, in standard errors, and as a share.
 ERRORS, SHARE = 3.0, 0.03
 
@@ -71,7 +76,10 @@ class Lengths(Check):
     """Links that are longer or shorter than in the description."""
 
     name = "lengths"
-    suspects = "lengths of links in the description that differ from those of the robot"
+    suspects = (
+        "lengths of links in the description that differ from those of the robot, or a zero or "
+        "scale of the positions of a joint that look like them"
+    )
     stage = 2
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
@@ -103,6 +111,10 @@ class Lengths(Check):
         )
         if min(duel.beside, _beside_gains(found)) < LEAST:
             return
+        other = _other_cause(fits, found)
+        if other is not None:
+            yield self._of_motion(measurement, other, found.gain)
+            return
         robot = fits.robot
         off = {
             body: f"from {_before(robot, body)} to {robot.body_joints[body]} by "
@@ -119,6 +131,71 @@ class Lengths(Check):
             "suspected",
             sorted({int(robot.tree.coordinates[body]) for body in off}),
         )
+
+    def _of_motion(self, measurement: Measurement, other: OtherCause, lengths: float) -> Suspicion:
+        """Positions of a joint from another zero, or of another scale."""
+        k, joint = other.joint, measurement.joint(other.joint)
+        if other.zero:
+            what = f"the zero of {joint} is off by about {np.rad2deg(other.zero):.0f} deg"
+            remedy = remedy_of("zero", {f"q{k + 1}": round(other.zero, 4)})
+        else:
+            what = f"positions and velocities of {joint} are {other.size:.3g} times as large"
+            factor = float(f"{1 / other.size:.4g}")
+            remedy = remedy_of("gain", {f"q{k + 1}": factor, f"dq{k + 1}": factor})
+        return self.suspicion(
+            what,
+            "with this correction, bodies near those of the description explain the torque better "
+            f"by {other.gain:.0f} (log-likelihood), and with other lengths of links by "
+            f"{lengths:.0f}",
+            "suspected",
+            [k],
+            remedy,
+        )
+
+
+@dataclass(frozen=True)
+class OtherCause:
+    """Positions of a joint that, corrected, explain more than other lengths do.
+
+    Attributes
+    ----------
+    joint : int
+        Joint, from 0.
+    zero : float, rad
+        Recorded position at its zero; 0 if its scale is wrong.
+    size : float
+        Factor of its positions.
+    gain : float
+        Log-likelihood gain.
+    """
+
+    joint: int
+    zero: float
+    size: float
+    gain: float
+
+
+def _other_cause(fits: Fits, found: Stretched) -> OtherCause | None:
+    """Another zero, or scale, of the positions of one joint that explains more than lengths."""
+    inflation, gains = fits.identified(Reading()).inflation, np.ones(fits.n_joints)
+
+    def posterior(reading: Reading) -> float:
+        return NearBodies(fits, reading, gains, inflation).plain.posterior
+
+    def with_zero(joint: int, angle: float) -> float:
+        return posterior(Reading(zero=((joint, angle),)))
+
+    def with_size(joint: int, logarithm: float) -> float:
+        return posterior(Reading(size=float(np.exp(logarithm)), sized=frozenset({joint})))
+
+    plain, causes = found.here.plain.posterior, []
+    for joint in np.flatnonzero(~fits.signals.prismatic).tolist():
+        zero, value = climb(partial(with_zero, joint), 0.0, *ZERO_STEPS)
+        causes.append(OtherCause(joint, float(zero), 1.0, value - plain))
+        size, value = climb(partial(with_size, joint), 0.0, *SIZE_STEPS)
+        causes.append(OtherCause(joint, 0.0, float(np.exp(size)), value - plain))
+    best = max(causes, key=lambda cause: cause.gain, default=None)
+    return best if best is not None and best.gain > found.gain + LITTLE else None
 
 
 def _beside_gains(found: Stretched) -> float:

@@ -38,6 +38,8 @@ FEW_VALUES = 64
 FINE = 50
 #: Share of the distance that its velocity implies by which a position that was held moves on.
 CAUGHT = 0.3
+#: The same in smallest changes of it: a joint may begin to move by one step of its sensor.
+ONE_STEP = 1.5
 
 
 def position_step(position: np.ndarray) -> float:
@@ -104,7 +106,8 @@ def _caught_up(
 ) -> np.ndarray:
     """Rows after which positions move on by more than in one step, as a mask.
 
-    Joints at rest whose velocity is late or noisy do not.
+    Joints at rest whose velocity is late or noisy do not, nor does a sensor that moves on by one of
+    its steps.
     """
     moved = np.abs(np.diff(position, axis=0))
     moved[trajectory[1:] != trajectory[:-1]] = 0
@@ -116,8 +119,10 @@ def _caught_up(
     speed = np.abs(velocity[1:])
     slow = np.sum(speed[~same], axis=0)
     usual = np.sum(moved[~same], axis=0) / np.where(slow > 0, slow, 1.0)
+    least = np.min(moved, axis=0, where=moved > 0, initial=np.inf)
     caught = np.zeros(len(position), dtype=bool)
-    caught[1:] = np.any((step > CAUGHT * usual * speed) & (speed > 0) & (step > 0), axis=1)
+    further = (step > CAUGHT * usual * speed) & (step > ONE_STEP * least)
+    caught[1:] = np.any(further & (speed > 0), axis=1)
     return caught
 
 

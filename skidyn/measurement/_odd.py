@@ -11,6 +11,7 @@ from itertools import repeat
 import numpy as np
 
 from skidyn._signals import Array
+from skidyn._text import trajectories_told
 from skidyn.measurement._bodies import Explained, explained
 from skidyn.measurement._check import Check
 from skidyn.measurement._duel import left_by_effects
@@ -50,6 +51,10 @@ SHIFTED, LEAST_ZERO = 3.0, np.deg2rad(4)
 #: Error of identified bodies, as a share of the spread, from which recordings are predicted by the
 #: bodies of the others alone.
 SPOILED = 0.12
+#: Size of torques over that of other recordings below which they may be only noise, least mean
+#: square of its successive differences over its own (2 of white noise), and least speed over that
+#: of the others.
+QUIET, WHITE, MOVES = 0.15, 1.0, 0.3
 #: How many times as far as in the others all torques of a recording spread that is in another unit.
 FAR = 50.0
 
@@ -81,6 +86,18 @@ class OddRecording(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if measurement.stale or measurement.lost or measurement.odd:
             return  # the rest is due to the clock, or another robot
+        silent = _silent(measurement)
+        if silent:
+            measurement.odd = True
+            yield self.suspicion(
+                f"in {trajectories_told(silent)} the torques of all joints are only noise near "
+                "zero",
+                "joints move there as in the other trajectories, but torques spread less than "
+                f"{QUIET:.0%} of theirs and change at random from row to row: the motors were off, "
+                "or no torque was recorded; leave these files out",
+                "certain",
+            )
+            return
         seen = explained(measurement)
         if seen is None:
             return
@@ -205,6 +222,23 @@ def _sizes(measurement: Measurement) -> dict[int, float]:
     size = spread / np.maximum(np.median(spread, axis=0), 1e-300)
     odd = (size > FAR).all(axis=1) | ((size < 1 / FAR) & (size > 0)).all(axis=1)
     return {int(run): float(np.median(x)) for run, x in zip(runs[odd], size[odd], strict=True)}
+
+
+def _silent(measurement: Measurement) -> list[int]:
+    """Recordings in which joints move as in the others, but all torques are noise near zero."""
+    signals, torque = measurement.signals, measurement.torque
+    runs = np.unique(signals.trajectory)
+    if len(runs) < 3:
+        return []
+    parts = [signals.trajectory == run for run in runs]
+    size = np.array([np.sqrt(np.mean(torque[rows] ** 2, axis=0)) for rows in parts])
+    speed = np.array([np.sqrt(np.mean(signals.dq[rows] ** 2, axis=0)) for rows in parts])
+    rough = np.array([np.mean(np.diff(torque[rows], axis=0) ** 2, axis=0) for rows in parts])
+    usual = np.median(size, axis=0)
+    quiet = (size < QUIET * usual) & (rough > WHITE * size**2)
+    moves = np.mean(speed > MOVES * np.median(speed, axis=0), axis=1) > 0.5
+    silent = quiet.all(axis=1) & moves & (usual > 0).all()
+    return [int(run) for run in runs[silent]] if np.mean(silent) < 0.5 else []
 
 
 def _zero_of(fits: Fits, run: int) -> tuple[int, float, float] | None:

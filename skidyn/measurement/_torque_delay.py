@@ -38,6 +38,9 @@ DRIFTED, TRIED = 1.5e-3, 2.0
 #: Share of the joints whose lags must be alike, or of what they gain; friction shifts each joint by
 #: another amount.
 AGREEING = 0.75
+#: Number of joints and lag, s, from which their lags need not be the same in slower and faster rows
+#: if all of them are alike: where it is large, the first order in it is only about the lag.
+MANY, LARGE = 5, 0.02
 #: How far the lag of one joint must be from those of others, s, and how nearly it must be the same
 #: in its slower and its faster rows, as a share of it.
 APART, SAME = 0.008, 0.3
@@ -47,8 +50,9 @@ FEWEST_SURE, LITTLE = 2, 0.2
 #: Log-likelihood that the lag of a single joint must gain; an unknown effect may look like one.
 ALONE = 60.0
 #: The same of the motion of a joint, by the torques of all joints: nothing else looks like it. It
-#: promises at most 9 on 20 logs without a mistake (``mistakes.py --seed 6610027``).
-MOVED = 25.0
+#: promises at most 9 on 20 logs without a mistake (``mistakes.py --seed 6610027``), and 33 where
+#: joints move one at a time.
+MOVED = 40.0
 
 
 #: Share of the recordings that may be late by themselves, and log-likelihood that they must gain:
@@ -108,6 +112,8 @@ class TorqueDelay(Check):
         slow, fast = found.halves.T
         same = use & (np.abs(slow - fast) < np.maximum(ALIKE, SAME * np.abs(found.joints)))
         agreeing, n_alike = _agree(found, same)
+        if not agreeing and _all_alike(found, use):
+            agreeing, n_alike = _agree(found, use)
         # if positions are late, the torque is early by the same time
         early = measurement.late_position
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
@@ -307,6 +313,12 @@ def _agree(found: Delay, use: NDArray[np.bool_]) -> tuple[bool, int]:
     enough = count >= len(use) / 2 and count > len(alike) / 2
     most = count >= AGREEING * len(alike) or float(weight[alike].sum()) >= AGREEING
     return enough and most, count
+
+
+def _all_alike(found: Delay, use: NDArray[np.bool_]) -> bool:
+    """Whether a large lag is that of every one of many joints, as no missing effect of them is."""
+    many = use.sum() >= MANY and use.all()
+    return bool(many and abs(found.common) > LARGE and _agree(found, use)[1] == use.sum())
 
 
 def _lowpass(fits: Fits, lag: float, late: Sequence[int], least: float = LIKELIER) -> float | None:
