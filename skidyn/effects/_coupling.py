@@ -177,13 +177,18 @@ class CouplingSpring(_PairEffect):
     a ``power`` of the distance from it, with coordinates in units of 1 rad or 1 m so that the unit
     of the stiffness is the same; or a distance from ``x0`` beyond which it stiffens as a hyperbolic
     sine (``stiffening``) or softens as a hyperbolic tangent (``softening``). A cable or hose that
-    can only pull acts on one ``side`` of ``x0``.
+    can only pull acts on one ``side`` of ``x0``; with ``bent``, it has another stiffness beyond
+    ``x0``.
     """
 
     kind = "coupling_spring"
     title = "Coupling spring"
     formula = r"k\,(q_i + r\,q_j - x_0)^p"
-    coefficients = (Coefficient("k", "N m/rad"), Coefficient("tau0", "N m", is_zero=True))
+    coefficients = (
+        Coefficient("k", "N m/rad"),
+        Coefficient("dk", "N m/rad"),
+        Coefficient("tau0", "N m", is_zero=True),
+    )
     shapes = (
         _RATIO,
         Shape("x0", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
@@ -197,6 +202,7 @@ class CouplingSpring(_PairEffect):
         {"x0": 0.0, "softening": 0.4},
         {"x0": 0.0, "side": 1.0},
         {"x0": 0.0, "side": -1.0},
+        {"x0": 0.0, "bent": 1.0},
     )
     simplicity = 16
     rivals = ("spring",)
@@ -242,6 +248,12 @@ class CouplingSpring(_PairEffect):
             force = form["softening"] * np.tanh(x / form["softening"])
         elif "side" in form:
             force = form["side"] * np.maximum(form["side"] * x, 0.0)
+        elif "bent" in form:
+            return np.column_stack([x, np.maximum(x, 0.0), np.ones_like(x)])
         else:
             force = np.sign(x) * np.abs(x) ** form.get("power", 1.0)
         return np.column_stack([force, np.ones_like(x)])
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        k, change, zero = self.coefficients
+        return (k, change, zero) if "bent" in shape else (k, zero)

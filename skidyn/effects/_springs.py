@@ -212,7 +212,8 @@ class EndStop(Effect):
     this length, minus 1 and times it, as foam does. A contact that loses energy has a larger torque
     during approach, by the factor ``1 + damping`` times the speed of the approach (Hunt, Crossley
     1975, J. Applied Mechanics 42(2)), and never pulls. With ``q_low`` in the shape there is a
-    contact at either end, the second below that position and as stiff as the first.
+    contact at either end, the second below that position and as stiff as the first. With
+    ``q_further``, a second spring sets in at that position, as behind a soft bumper.
     """
 
     kind = "end_stop"
@@ -221,15 +222,20 @@ class EndStop(Effect):
         r"s\,k\,\max(0,\ s\,(q - q_\mathrm{lim}))^p\,"
         r"\max(0,\ 1 + d\,s\,\dot q),\quad s = \pm 1"
     )
-    coefficients = (Coefficient("k", "N m/rad", sign=1),)
+    coefficients = (
+        Coefficient("k", "N m/rad", sign=1),
+        Coefficient("k_further", "N m/rad", sign=1),
+    )
     shapes = (
         Shape("q_lim", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("q_low", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
+        Shape("q_further", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("damping", "s/rad", (), 1e-3, 1e3, scales=False, has_interval=False),
         Shape("power", "1", (), 0.7, 2.2, scales=False, has_interval=False),
         Shape("stiffening", "rad", (), 0.01, 2.0, has_interval=False),
     )
     forms = (
+        {"q_further": 0.4},  # of the deflection
         {"power": 2.0},
         {"stiffening": 0.4},  # of the deflection
         {"power": 1.0, "damping": 0.5},
@@ -249,7 +255,7 @@ class EndStop(Effect):
             for share in (0.80, 0.84, 0.88, 0.92, 0.95)
             for side in (1.0, -1.0)
         ]
-        stronger, foam, *damped, _, both_damped = map(dict, self.forms)
+        further, stronger, foam, *damped, _, both_damped = map(dict, self.forms)
         some = [stops[k] for k in (2, 3, 6, 7)]
         softer = [
             stop | form | {"damping": form["damping"] / unit} for form in damped for stop in some
@@ -265,6 +271,8 @@ class EndStop(Effect):
         for stop in some:
             depth = float((stop["side"] * (q - stop["q_lim"])).max())
             stiffer.append(stop | {"stiffening": foam["stiffening"] * depth})
+            behind = stop["q_lim"] + stop["side"] * further["q_further"] * depth
+            stiffer.append(stop | {"q_further": behind})
         return [*stops, *stiffer, *softer, *both]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
@@ -273,6 +281,10 @@ class EndStop(Effect):
         beyond = float(np.mean(depth > 0))
         if not stiffens(depth[depth > 0], shape.get("stiffening", np.inf)):
             return False
+        if "q_further" in shape:
+            behind = shape["side"] * (shape["q_further"] - shape["q_lim"])
+            if behind <= 0 or np.mean(depth > behind) < FEWEST_TOUCHING:
+                return False
         if "q_low" not in shape:
             return FEWEST_TOUCHING < beyond < MOST_TOUCHING
         below = float(np.mean(q < shape["q_low"]))
@@ -290,4 +302,11 @@ class EndStop(Effect):
             push = np.maximum(0.0, side * (q - limit))
             push = side * (push**power if scale is None else scale * (np.exp(push / scale) - 1.0))
             torque += push * np.maximum(0.0, 1.0 + damping * side * dq) if damping else push
-        return torque[:, None]
+        if "q_further" not in shape:
+            return torque[:, None]
+        side = shape["side"]
+        second = side * np.maximum(0.0, side * (q - shape["q_further"]))
+        return np.column_stack([torque, second])
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        return self.coefficients if "q_further" in shape else self.coefficients[:1]

@@ -20,6 +20,8 @@ _BITTENCOURT = "Bittencourt, Wernholt, Sander-Tavallaey, Brogardh (2010), IROS, 
 _CHANGES = 16
 #: Share of the recording before the last one in which a change that lasts is to be seen.
 _SHOWN = 0.02
+#: Least share of a log on either side of a temperature at which a slope changes.
+_LEAST_SIDE = 0.05
 #: Ratio of the two time constants of a warm-up.
 _FASTER = 4.0
 
@@ -102,7 +104,11 @@ class TemperatureFriction(_OverTemperature):
 
 
 class TemperatureOffset(_OverTemperature):
-    """Torque offset that changes with a logged temperature, and may level off exponentially."""
+    """Torque offset that changes with a logged temperature, and may level off exponentially.
+
+    With ``knee`` in its shape, it has another slope from that temperature on, in degrees Celsius,
+    or even turns back, as of a strain gauge with imperfect compensation.
+    """
 
     kind = "temperature_offset"
     title = "Temperature-dependent offset"
@@ -110,8 +116,14 @@ class TemperatureOffset(_OverTemperature):
     coefficients = (
         Coefficient("dtau_dT", "N m/K"),
         Coefficient("d2tau_dT2", "N m/K^2"),
+        Coefficient("dtau_dT_change", "N m/K"),
         Coefficient("tau0", "N m", is_zero=True),
     )
+    shapes = (
+        *_OverTemperature.shapes,
+        Shape("knee", "K", (), -np.inf, np.inf, spacing="linear", scales=False),
+    )
+    forms = (*_OverTemperature.forms, *({"knee": share} for share in (0.25, 0.5, 0.75)))
     simplicity = 13
     rivals = ("offset", "temperature_friction")
     separating_motion = "one pose held or one sweep repeated while the robot warms up"
@@ -119,7 +131,28 @@ class TemperatureOffset(_OverTemperature):
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         warm = _warmth(signals, joint, shape)
         further = [warm**2] if "curved" in shape else []
+        if "knee" in shape:
+            further = [np.maximum(warm + REFERENCE_TEMPERATURE - shape["knee"], 0.0)]
         return np.column_stack([warm, *further, np.ones(signals.n_samples)])
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        own = super().coefficients_of(shape)
+        return tuple(c for c in own if "knee" in shape or c.name != "dtau_dT_change")
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        shapes = super().grid(signals, joints)
+        if signals.temperature is not None:
+            own = signals.temperature[:, joints[0]]
+            for shape in shapes:
+                if "knee" in shape:
+                    shape["knee"] = float(own.min() + shape["knee"] * np.ptp(own))
+        return shapes
+
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        if "knee" not in shape or signals.temperature is None:
+            return super().admissible(signals, joints, shape)
+        above = float(np.mean(signals.temperature[:, joints[0]] > shape["knee"]))
+        return _LEAST_SIDE < above < 1 - _LEAST_SIDE
 
 
 class FrictionDrift(Effect):
