@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -62,8 +62,14 @@ class _OverTemperature(Effect):
 
     drawn_against = "temperature"
     needs = ("temperature",)
-    shapes = (Shape("levels_over", "K", (), 1.5, 60.0, scales=False, has_interval=False),)
-    forms = ({"levels_over": 6.0}, {"levels_over": 15.0}, {"curved": 1.0})
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("levels_over", "K", (), 1.5, 60.0, scales=False, has_interval=False),
+    )
+    forms: ClassVar[tuple[Mapping[str, float], ...]] = (
+        {"levels_over": 6.0},
+        {"levels_over": 15.0},
+        {"curved": 1.0},
+    )
     reference = _BITTENCOURT
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:

@@ -304,8 +304,8 @@ def _multiples(seen: Explained) -> list[Multiple]:
             if k in others:
                 predicted, scale = others[k]
             spoils = scale < outcome.scale[k] / 2
-            if seen.stated.scale[k] < scale / 2:
-                # the torque of a joint in another unit spoils bodies common to all of them
+            if seen.stated.scale[k] < max(scale, float(outcome.scale[k])) / 2:
+                # torques of joints in other units spoil bodies common to all of them
                 predicted, scale = (y - seen.stated.residual[k])[own], float(seen.stated.scale[k])
                 spoils = False
             found = _multiple(y[own], predicted, scale) if own.sum() >= FEWEST else None

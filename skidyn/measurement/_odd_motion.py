@@ -26,6 +26,9 @@ MOVED = 0.25
 RESOLVED = 6.0
 #: How nearly joints share a slope.
 SHARED = 0.05
+#: Least correlation of velocity and position, largest difference of their slopes between joints,
+#: and least one between recordings, for clocks with another rate in each of them.
+ALIKE, SAME, OTHER = 0.99, 0.02, 0.04
 #: Spread of a velocity, and its way through a recording whose position is stuck, in rad or m.
 LEAST_SPEED, LEAST_SWEPT = 0.02, 0.1
 
@@ -41,6 +44,18 @@ class OddMotion(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if measurement.clock != 1:
             return  # what is short or a gap is another in the wrong unit
+        rates = own_rates(measurement.signals)
+        if rates:
+            measurement.stale = True  # no value is that of its time
+            told = ", ".join(f"{rate:.3g} in {run}" for run, rate in rates.items())
+            yield self.suspicion(
+                "the clock has another rate in every trajectory",
+                f"velocities are so many times the differentiated positions: {told}, equally in "
+                "all joints; recordings were stretched to a common duration, or have different "
+                "sampling rates; use their own times",
+                "certain",
+            )
+            return
         for run, slopes in measurement.odd_motion.items():
             names = measurement.joints(slopes)
             sizes = np.array(list(slopes.values()))
@@ -66,6 +81,39 @@ class OddMotion(Check):
                 "certain",
                 () if every else list(slopes),
             )
+
+
+def own_rates(signals: Signals) -> dict[int, float]:
+    """Slopes of velocity on differentiated position if they differ from recording to recording.
+
+    A clock is that of all joints: on each joint, the slopes have to be the same.
+
+    Parameters
+    ----------
+    signals : Signals
+        Recorded motion.
+
+    Returns
+    -------
+    dict of int to float
+        By recording; empty if most recordings have the same, or joints differ.
+    """
+    runs = np.unique(signals.trajectory)
+    if len(runs) < FEWEST:
+        return {}
+    rates = {}
+    for run in runs.tolist():
+        parts = [rows for rows in signals.segments if signals.trajectory[rows.start] == run]
+        found = [
+            velocity_consistency(signals.clock, signals.q[:, k], signals.dq[:, k], parts)
+            for k in range(signals.n_joints)
+        ]
+        own = np.array([slope for slope, likeness in found if likeness > ALIKE])
+        if len(own) < 2 or not np.ptp(own) < SAME * abs(float(np.median(own))):
+            return {}
+        rates[run] = float(np.median(own))
+    off = np.abs(np.array(list(rates.values())) / np.median(list(rates.values())) - 1)
+    return rates if np.mean(off > OTHER) > 1 - MOST else {}
 
 
 def odd_motion(

@@ -141,3 +141,14 @@ def test_a_spring_does_not_stiffen_within_a_tiny_share_of_its_travel(signals):
     reach = float(np.abs(x - shape["x0"]).max())
     assert effect.admissible(signals, (0, 1), shape | {"stiffening": reach / 3})
     assert not effect.admissible(signals, (0, 1), shape | {"stiffening": reach / 400})
+
+
+def test_a_coupling_with_another_stiffness_beyond_its_bend(signals):
+    effect = get_effect("coupling_spring")
+    x = signals.q[:, 0] + 0.5 * signals.q[:, 1] - 0.1
+    columns = effect.torque_columns(signals, (0, 1), ratio=0.5, x0=0.1, bent=1.0)
+    expected = np.column_stack([x, np.maximum(x, 0), np.ones_like(x)])
+    np.testing.assert_allclose(columns[0], expected)
+    np.testing.assert_allclose(columns[1], 0.5 * expected)
+    assert [c.name for c in effect.coefficients_of({"bent": 1.0})] == ["k", "dk", "tau0"]
+    assert [c.name for c in effect.coefficients_of({})] == ["k", "tau0"]

@@ -106,3 +106,15 @@ def test_rubber_is_not_tried_where_its_torque_would_overflow():
         assert np.abs(effect.torque_columns(signals, (0,), **shape)[0]).max() < 1e20
     assert effect.admissible(signals, (0,), {"rest": 0.0, "scale": 20.0})
     assert not effect.admissible(signals, (0,), {"rest": 0.0, "scale": 0.3})
+
+
+def test_a_second_spring_sets_in_behind_a_soft_bumper(signals, columns_of):
+    q = signals.q[:, 0]
+    both = columns_of("end_stop", signals, q_lim=0.2, side=1.0, q_further=0.5)
+    np.testing.assert_allclose(both[:, 0], np.maximum(0, q - 0.2))
+    np.testing.assert_allclose(both[:, 1], np.maximum(0, q - 0.5))
+    effect = get_effect("end_stop")
+    assert len(effect.coefficients_of({"q_further": 0.5})) == 2
+    assert len(effect.coefficients_of({})) == 1
+    joints, stop = (0,), {"q_lim": 0.0, "side": 1.0}
+    assert not effect.admissible(signals, joints, stop | {"q_further": -0.1})

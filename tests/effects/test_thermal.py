@@ -67,3 +67,16 @@ def test_a_change_in_the_last_recording_alone_is_not_tried(signals):
     assert moments
     assert max(moments) < 3.0  # where the last of two begins
     assert not effect.admissible(signals, (0,), {"since": 3.0})
+
+
+def test_an_offset_turns_at_a_temperature(signals, columns_of):
+    own = signals.temperature[:, 0]
+    knee = float(np.median(own))
+    columns = columns_of("temperature_offset", signals, knee=knee)
+    turned = np.column_stack([own - 30.0, np.maximum(own - knee, 0), np.ones_like(own)])
+    np.testing.assert_allclose(columns, turned)
+    effect = get_effect("temperature_offset")
+    assert effect.admissible(signals, (0,), {"knee": knee})
+    assert not effect.admissible(signals, (0,), {"knee": float(own.max())})
+    tried = {shape["knee"] for shape in effect.grid(signals, (0,)) if "knee" in shape}
+    assert len(tried) == 3 and own.min() < min(tried) < max(tried) < own.max()

@@ -62,3 +62,17 @@ def test_links_of_an_arm():
 def test_gains_and_coarse_torque_make_no_link_longer(change):
     frame = LOG.assign(tau2=change(LOG["tau2"]))
     assert "lengths" not in {s.check for s in told(frame, ARM)}
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda q, dq: (q + 0.4, dq), "the zero of joint 2 is off by about 23 deg"),
+        (lambda q, dq: (0.6 * q, 0.6 * dq), "positions and velocities of joint 2"),
+    ],
+)
+def test_a_zero_or_scale_of_positions_is_no_length(change, text):
+    frame = LOG.copy()
+    frame["q2"], frame["dq2"] = change(frame["q2"], frame["dq2"])
+    found = told(frame, ARM)
+    assert "lengths of links" not in " ".join(s.suspicion for s in found)

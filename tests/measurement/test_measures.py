@@ -43,3 +43,10 @@ def test_rest_and_reversals():
 def test_parts_of_one_value_end_with_their_recording():
     begins, ends = equal_values(np.array([3.0, 3, 1, 1, 1, 2]), np.array([0, 0, 0, 0, 1, 1]))
     assert begins.tolist() == [0, 2, 4, 5] and ends.tolist() == [2, 4, 5, 6]
+
+
+def test_a_joint_that_begins_to_move_by_one_step_of_its_sensor_repeats_no_row():
+    position = np.repeat([[0.0], [1.0], [3.0], [6.0], [9.0], [12.0]], [20, 1, 1, 1, 1, 1], axis=0)
+    velocity = np.linspace(0.05, 3.0, len(position))[:, None]
+    again = is_repeated(position, velocity, np.zeros(len(position), dtype=int))
+    assert not again.any()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Single recordings whose torque is not that of the others."""
 
+import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
@@ -62,3 +63,23 @@ def test_a_load_of_other_recordings_does_not_hide_the_zero_of_one():
     (told,) = [s for s in check_log(frame, arm).checks if s.certainty != "noted"]
     assert told.check == "odd_recording" and told.joints == (1,)
     assert told.suspicion.startswith("in trajectory 4 the zero of ")
+
+
+def test_a_recording_without_torque():
+    frame = FRAME.copy()
+    own = frame["trajectory"] == RUN
+    noise = np.random.default_rng(0).normal(size=(int(own.sum()), 2))
+    frame.loc[own, ["tau1", "tau2"]] = 0.01 * frame[["tau1", "tau2"]].std().to_numpy() * noise
+    (told,) = [s for s in check_log(frame, ROBOT).checks if s.certainty != "noted"]
+    assert (told.check, told.certainty) == ("odd_recording", "certain")
+    assert told.suspicion == (
+        f"in trajectory {RUN} the torques of all joints are only noise near zero"
+    )
+
+
+@pytest.mark.slow
+def test_torques_of_joints_in_other_units_are_not_those_of_one_recording():
+    frame = FRAME[FRAME["trajectory"].isin(FRAME["trajectory"].unique()[:4])].copy()
+    frame[["tau1", "tau2"]] *= [14.0, 751.0]
+    told = {s.check for s in check_log(frame, ROBOT).checks}
+    assert "torque_scale" in told and "odd_recording" not in told

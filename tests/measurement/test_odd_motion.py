@@ -68,3 +68,17 @@ def test_a_slow_recording_whose_velocity_is_cut_to_few_digits():
     step = min(step, 0.99 * frame.loc[OWN, "dq2"].abs().max())
     frame["dq2"] = np.trunc(frame["dq2"] / step) * step
     assert "odd_motion" not in {s.check for s in check_log(frame, ROBOT).checks}
+
+
+def test_recordings_that_were_stretched_to_one_duration():
+    frame = FRAME.copy()
+    for run, factor in zip(
+        frame["trajectory"].unique(), (1.4, 0.8, 1.1, 0.9, 1.25, 1.0), strict=False
+    ):
+        own = frame["trajectory"] == run
+        start = frame.loc[own, "time"].min()
+        frame.loc[own, "time"] = start + factor * (frame.loc[own, "time"] - start)
+    (told,) = [s for s in check_log(frame, ROBOT).checks if s.certainty != "noted"]
+    assert (told.check, told.certainty) == ("odd_motion", "certain")
+    assert told.suspicion == "the clock has another rate in every trajectory"
+    assert "1.4 in" in told.evidence
