@@ -25,6 +25,10 @@ from skidyn.measurement._suspicion import Certainty, Suspicion, remedy_of
 BELOW, TURNS = 0.01, 4
 #: Share of zeros from which a torque is not a magnitude but only its one direction.
 CUT = 0.05
+#: Share of the largest speed above which the direction of motion is known, fewest rows in which
+#: bodies oppose it strongly, and share of rows in which a torque that has the sign of the velocity
+#: does not.
+SLOW, FEWEST_AGAINST, ALWAYS = 0.1, 50, 0.98
 #: Log-likelihood that the magnitude must gain over the torque itself, and to be sure.
 LEAST, SURE = 15.0, 40.0
 
@@ -51,6 +55,16 @@ class UnsignedTorque(Check):
             )
         unsigned, gains = unsigned_columns(measurement)
         if not unsigned:
+            along = signed_by_velocity(measurement)
+            if along:
+                yield self.suspicion(
+                    f"the torque of {measurement.joints(along)} has the sign of the velocity",
+                    "it never opposes the motion, also where the rigid-body torque against it is "
+                    "larger than the usual torque: a magnitude, such as an effective current, was "
+                    "given the sign of the velocity",
+                    "suspected",
+                    along,
+                )
             return
         moving = [k for k, moves in enumerate(measurement.excited) if moves]
         every = len(unsigned) >= 3 and set(moving) <= set(unsigned)
@@ -134,6 +148,24 @@ def _unsigned(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
     if enough and set(moving) <= set(one_sided):
         return one_sided, gains  # a logger of magnitudes records no sign in any column
     return sorted(gains), gains  # gravity alone may give one a single sign
+
+
+def signed_by_velocity(measurement: Measurement) -> list[int]:
+    """Columns of the torque that never oppose the motion where bodies do so strongly."""
+    robot, signals = measurement.robot, measurement.signals
+    if robot is None or not measurement.readable:
+        return []
+    bodies = robot.inverse_dynamics(signals.q, signals.dq, signals.ddq)
+    found = []
+    for k in np.flatnonzero(measurement.excited).tolist():
+        torque, speed = measurement.torque[:, k], signals.dq[:, k]
+        fast = np.abs(speed) > SLOW * np.abs(speed).max()
+        usual = float(np.sqrt(np.mean(torque[fast] ** 2))) if fast.any() else 0.0
+        against = fast & (bodies[:, k] * np.sign(speed) < -usual)
+        for_it = float(np.mean(torque[fast] * speed[fast] > 0)) if fast.any() else 0.0
+        if against.sum() >= FEWEST_AGAINST and for_it > ALWAYS:
+            found.append(k)
+    return found
 
 
 def _magnitude_gain(fits: Fits, k: int) -> float:

@@ -23,3 +23,13 @@ def test_torque_cut_at_zero(signals, torque, found):
     told = [s for s in found(signals, cut) if s.certainty == "certain"]
     assert [(s.check, s.joints) for s in told] == [("unsigned_torque", (2,))]
     assert told[0].remedy is None
+
+
+def test_a_magnitude_with_the_sign_of_the_velocity(signals, torque, found):
+    def told_of(columns):
+        told = [s for s in found(signals, columns) if s.check == "unsigned_torque"]
+        return [(s.certainty, s.joints) for s in told]
+
+    assert told_of(torque) == []
+    # bodies never oppose the motion of joint 2 by much
+    assert told_of(np.abs(torque) * np.sign(signals.dq)) == [("suspected", (1,))]
