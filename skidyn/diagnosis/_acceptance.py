@@ -265,7 +265,8 @@ class JudgingSearch(ChoosingSearch):
         The formula of an oscillating link is of first order: it leaves more to an unknown function,
         and to a delay, which is the first order of any lag. A part of the recordings is chosen for
         what the formula leaves there. Of a family, the simplest formula that explains nearly as
-        much as the best one is used, which leaves the rest.
+        much as the best one is used, which leaves the rest. A function of the same signals is the
+        error of a formula rather than another effect, up to the same share.
         """
         settings = self.settings
         first_order = beside.kind == UNKNOWN or any(
@@ -282,7 +283,8 @@ class JudgingSearch(ChoosingSearch):
                 swings = c.term.effect.moves_link and first_order
                 loose = nameless or swings or in_part(beside)
                 share = settings.nameless_tolerance if loose else settings.form_tolerance
-                if c.term.effect.family:
+                same = beside.kind == UNKNOWN and set(beside.variables) <= _signals_of(c)
+                if c.term.effect.family or (same and beside.variables):
                     share = max(share, 1 - settings.family_share)
                 reached = list(c.rows)
                 shares[reached] = np.maximum(shares[reached], share)
@@ -427,6 +429,14 @@ class JudgingSearch(ChoosingSearch):
         if robot is None or robot.tree.n_bodies != self.problem.n_joints:
             return j - i == 1  # bodies that follow others have no joints of their own
         return int(robot.tree.parents[j]) == i
+
+
+def _signals_of(candidate: Candidate) -> set[str]:
+    """Names of the signals of its own joints on which an effect mostly depends."""
+    term = candidate.term
+    own = {"temperature": "temp"}.get(term.effect.drawn_against, term.effect.drawn_against)
+    signals = {own, "dq"} if term.is_dry else {own}
+    return {f"{signal}{j + 1}" for signal in signals for j in term.places}
 
 
 def _share_of_error(tester: Tester, candidate: Candidate) -> float:

@@ -145,14 +145,13 @@ class TemperatureOffset(_OverTemperature):
         own = super().coefficients_of(shape)
         return tuple(c for c in own if "knee" in shape or c.name != "dtau_dT_change")
 
-    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        shapes = super().grid(signals, joints)
-        if signals.temperature is not None:
-            own = signals.temperature[:, joints[0]]
-            for shape in shapes:
-                if "knee" in shape:
-                    shape["knee"] = float(own.min() + shape["knee"] * np.ptp(own))
-        return shapes
+    def _plain_and_forms(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        forms = super()._plain_and_forms(signals, joints)
+        if signals.temperature is None:
+            return forms
+        own = signals.temperature[:, joints[0]]
+        low, span = float(own.min()), float(np.ptp(own))
+        return [f | {"knee": low + span * f["knee"]} if "knee" in f else f for f in forms]
 
     def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         if "knee" not in shape or signals.temperature is None:
