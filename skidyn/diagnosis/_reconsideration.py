@@ -25,6 +25,7 @@ from skidyn.diagnosis._hypothesis import (
 )
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._rule import BETWEEN, NEARLY
+from skidyn.diagnosis._search_state import still_free
 from skidyn.effects import Term, get_effect
 
 
@@ -171,8 +172,7 @@ class ReconsideringSearch(DuellingSearch):
         """Continue without a finding, whose place is free for others."""
         self.findings.remove(old)
         self.chosen = [c for c in self.chosen if c not in old.candidates]
-        taken = {c.site for c in self.chosen}
-        self.pool = [c for c in self.whole_pool if c.site not in taken]
+        self.pool = still_free(self.whole_pool, self.chosen)
         self.refit()
         self.sigma, self.left = self.weights(), self._left()
 

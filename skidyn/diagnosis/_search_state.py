@@ -157,8 +157,7 @@ class SearchState:
         else:
             self.chosen = [*self.chosen, *best.candidates]
         self.findings.append(best)
-        taken = {c.site for c in best.candidates}
-        self.pool = [c for c in self.pool if c.site not in taken]
+        self.pool = still_free(self.pool, best.candidates)
 
     @property
     def residual(self) -> Array:
@@ -338,6 +337,18 @@ class SearchState:
         count += 2 * sum(len(c.term.spans) for c in candidates)
         count += 2 * any(c.term.course for c in candidates)
         return count
+
+
+def still_free(pool: Sequence[Candidate], chosen: Sequence[Candidate]) -> list[Candidate]:
+    """Candidates at sites that are not taken yet.
+
+    What acts on the whole robot and may change, as a tilted base, may be another one in a part of
+    the recordings.
+    """
+    taken = {
+        c.site for c in chosen if c.term.effect.scope != "robot" or not c.term.effect.comes_and_goes
+    }
+    return [c for c in pool if c.site not in taken]
 
 
 def replace_torque(problem: Problem, torque: Array) -> Problem:
