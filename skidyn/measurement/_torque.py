@@ -26,9 +26,9 @@ BELOW, TURNS = 0.01, 4
 #: Share of zeros from which a torque is not a magnitude but only its one direction.
 CUT = 0.05
 #: Share of the largest speed above which the direction of motion is known, fewest rows in which
-#: bodies oppose it strongly, and share of rows in which a torque that has the sign of the velocity
-#: does not.
-SLOW, FEWEST_AGAINST, ALWAYS = 0.1, 50, 0.98
+#: bodies oppose it by this multiple of their spread, share of rows in which a torque that has the
+#: sign of the velocity does not, and its least correlation with these bodies there.
+SLOW, FEWEST_AGAINST, STRONGLY, ALWAYS, GROWS = 0.1, 50, 0.5, 0.98, 0.5
 #: Log-likelihood that the magnitude must gain over the torque itself, and to be sure.
 LEAST, SURE = 15.0, 40.0
 
@@ -59,9 +59,8 @@ class UnsignedTorque(Check):
             if along:
                 yield self.suspicion(
                     f"the torque of {measurement.joints(along)} has the sign of the velocity",
-                    "it never opposes the motion, also where the rigid-body torque against it is "
-                    "larger than the usual torque: a magnitude, such as an effective current, was "
-                    "given the sign of the velocity",
+                    "it never opposes the motion, and grows where the rigid-body torque does: a "
+                    "magnitude, such as an effective current, was given the sign of the velocity",
                     "suspected",
                     along,
                 )
@@ -151,7 +150,10 @@ def _unsigned(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
 
 
 def signed_by_velocity(measurement: Measurement) -> list[int]:
-    """Columns of the torque that never oppose the motion where bodies do so strongly."""
+    """Columns of the torque that never oppose the motion, and grow where bodies do so strongly.
+
+    The torque of a joint with much friction does not oppose it either, but becomes smaller there.
+    """
     robot, signals = measurement.robot, measurement.signals
     if robot is None or not measurement.readable:
         return []
@@ -160,10 +162,12 @@ def signed_by_velocity(measurement: Measurement) -> list[int]:
     for k in np.flatnonzero(measurement.excited).tolist():
         torque, speed = measurement.torque[:, k], signals.dq[:, k]
         fast = np.abs(speed) > SLOW * np.abs(speed).max()
-        usual = float(np.sqrt(np.mean(torque[fast] ** 2))) if fast.any() else 0.0
-        against = fast & (bodies[:, k] * np.sign(speed) < -usual)
-        for_it = float(np.mean(torque[fast] * speed[fast] > 0)) if fast.any() else 0.0
-        if against.sum() >= FEWEST_AGAINST and for_it > ALWAYS:
+        own = bodies[:, k] * np.sign(speed)
+        against = fast & (own < -STRONGLY * np.std(bodies[:, k]))
+        if against.sum() < FEWEST_AGAINST or not np.mean(torque[fast] * speed[fast] > 0) > ALWAYS:
+            continue
+        size, opposing = np.abs(torque[against]), -own[against]
+        if np.ptp(size) and np.ptp(opposing) and np.corrcoef(size, opposing)[0, 1] > GROWS:
             found.append(k)
     return found
 
