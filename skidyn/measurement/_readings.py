@@ -127,7 +127,9 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             judged = [c for c in judged if c.kind != "gravity"]
     if (judged or fits.loads) and reading.gravity is None:
         restored_change = _restored(fits, reading, here)
-        if restored_change is not None:
+        if restored_change is not None and not _explains_more(
+            fits, reading, judged, restored_change
+        ):
             return restored_change
 
     @cache
@@ -431,6 +433,21 @@ def _restored(fits: Fits, reading: Reading, here: Outcome) -> Change | None:
     whole = fits.with_gravity(without).identified(replace(without, gravity=None))
     drop = _drop(fits.identified(reading), whole)
     return Change("no_gravity", (), without, kept, kept, drop=drop, restorable=True)
+
+
+def _explains_more(
+    fits: Fits, reading: Reading, judged: Sequence[Change], restored: Change
+) -> bool:
+    """Whether a change of columns explains more than gravity that was subtracted.
+
+    It does so with stated bodies as well as with identified ones.
+    """
+    now = fits.identified(reading)
+    return any(
+        fits.identified(change.reading).gained_over(now) > restored.confirmed
+        for change in judged
+        if change.kind not in ("gravity", "no_gravity") and change.gain > restored.gain
+    )
 
 
 def _restored_gain(fits: Fits, without: Reading, reading: Reading) -> tuple[float, float]:
