@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.diagnosis._signal_products import Product, predictable, simple_functions
+from skidyn.diagnosis._profile import QUARTERS
+from skidyn.diagnosis._signal_products import Product, predictable, simple_functions, values_of
 
 #: Most recordings: each has a coefficient of its own.
 MOST_RECORDINGS = 24
-#: Parts into which the rows of a recording are divided, and least number of rows of each.
-QUARTERS, FEWEST_ROWS = 4, 4
+#: Least number of rows in each quarter of a recording.
+FEWEST_ROWS = 4
 #: A function that varies within a part by a smaller share of its squares counts as constant.
 CONSTANT = 1e-9
 
@@ -47,8 +48,7 @@ def changing_size(
     if not 1 < len(names) <= MOST_RECORDINGS or counts.min() < FEWEST_ROWS:
         return None
     functions = [f for name, x in signals.items() for f in simple_functions(name, x)]
-    values = np.column_stack([f.of(signals[f.signal]) for f in functions])
-    values /= np.maximum(np.abs(values).max(axis=0), 1e-300)
+    values = values_of(functions, signals)
     order = np.argsort(cell, kind="stable")
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
 

@@ -368,6 +368,7 @@ def _sure(
     # single joint does not show this.
     ratio = errors[1] / np.maximum(parts.noise, np.finfo(float).tiny)
     alike = max(1.0, float(ratio.min())) if len(ratio) > 1 else 1.0
+    in_some = any(t.trajectories is not None for t in finding.terms)
     probability = confidence(
         finding.margin,
         float(parts.inflation[joints].max()),
@@ -378,8 +379,8 @@ def _sure(
         whole_recordings=whole,
         alike=finding.alike,
         rivalled=bool(finding.rivals),
-        in_some=finding.trajectories is not None,
-        few=finding.trajectories is not None and all(t.effect.by_recording for t in finding.terms),
+        in_some=in_some,
+        few=in_some and all(t.effect.by_recording for t in finding.terms),
         stays=finding.kind != UNKNOWN and mostly_stays(before, after, alike * parts.noise[same]),
         change=finding.change,
         instead=finding.instead is not None,

@@ -248,9 +248,9 @@ def make_finding(
         code = "model = diagnosis.model"
     else:
         code = f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'
+    # None as well for what acts in every recording, with a size of its own
     some = term.trajectories
-    if some is not None and len(some) == len(problem.rows.recordings):
-        some = None  # in every recording, with a size of its own
+    some = None if some is not None and len(some) == len(problem.rows.recordings) else some
     sentence = f"{told_briefly(title, joints, some, parameters)}. "
     sentence += f"It {spans_told(term.spans)}. " if term.spans else ""
     sentence += f"It {course_told(term)}. " if term.course else ""
@@ -290,7 +290,7 @@ def make_finding(
         (term,),
         compared.margin,
         None,
-        term.trajectories,
+        some,
         alike=hypothesis.alike,
         elsewhere=elsewhere,
         nearest=nearest,

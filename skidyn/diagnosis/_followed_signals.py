@@ -90,10 +90,8 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     step = max(1, -(-len(y) // MOST_ROWS))
     signals = {name: x[::step] for name, x in averaged_signals(problem, joint).items()}
     y = y[::step]
-    recording, quarter = (
-        of[joint][::step] for of in (problem.rows.trajectory, problem.rows.quarter)
-    )
-    own = changing_size(signals, y, recording, quarter)
+    rows = problem.rows
+    own = changing_size(signals, y, rows.trajectory[joint][::step], rows.quarter[joint][::step])
     changing = [] if own is None else [own]
     # numbered without gaps: dropped trajectories must not leave an empty quarter below
     numbers, fold = np.unique(problem.fold[joint][::step], return_inverse=True)

@@ -125,8 +125,7 @@ def product_of_three(
         for factor in simple_functions(name, x)
         if factor.function in ("value", "side", "size")
     ]
-    values = np.column_stack([factor.of(signals[factor.signal]) for factor in factors])
-    values /= np.maximum(np.abs(values).max(axis=0), 1e-300)
+    values = values_of(factors, signals)
     own = np.unique([factor.signal for factor in factors], return_inverse=True)[1]
     best, gain, among = _best_triple(values, own, y)
     if gain <= least or not _predicted_by([_without_mean(values[:, best].T)], y, fold):
@@ -212,8 +211,7 @@ class _Pairs:
     def of(cls, signals: dict[str, Array]) -> _Pairs:
         functions = [simple_functions(name, x) for name, x in signals.items()]
         factors = [factor for some in functions for factor in some]
-        values = np.column_stack([f.of(signals[f.signal]) for f in factors])
-        values = values / np.maximum(np.abs(values).max(axis=0), 1e-300)
+        values = values_of(factors, signals)
         count, constant = values.shape[1], np.ones(len(values))
         first, second = np.triu_indices(count, 1)
         first = np.concatenate([np.arange(count), first])
@@ -261,6 +259,24 @@ class _Pairs:
         return np.asarray(third[self.first, self.second] - self.mean * y.sum())
 
 
+def values_of(factors: Sequence[Factor], signals: dict[str, Array]) -> Array:
+    """Values of functions of signals, side by side, each divided by its largest magnitude.
+
+    Parameters
+    ----------
+    factors : sequence of Factor
+        Functions.
+    signals : dict of str to ndarray of shape (n_rows,)
+        By name.
+
+    Returns
+    -------
+    ndarray of shape (n_rows, n_functions)
+    """
+    values = np.column_stack([factor.of(signals[factor.signal]) for factor in factors])
+    return np.asarray(values / np.maximum(np.abs(values).max(axis=0), 1e-300))
+
+
 def simple_functions(name: str, x: Array) -> list[Factor]:
     """Simple functions of a signal; positions are taken from the middle of their range.
 
@@ -270,6 +286,10 @@ def simple_functions(name: str, x: Array) -> list[Factor]:
         Signal, joints counted from 1.
     x : ndarray of shape (n_rows,)
         Its values.
+
+    Returns
+    -------
+    list of Factor
     """
     if name.startswith("q"):
         middle = float((x.min() + x.max()) / 2)

@@ -115,6 +115,7 @@ class SizeByRecording(NamelessEffect):
         of, function, middle = factor
         own = tuple(recordings)
         shape = {"of": of, "function": function, "middle": middle, "recordings": own}
+        # "trajectories" of a term, which its columns do not see, keep it out of other recordings
         return {**shape, "trajectories": own}
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:

@@ -32,6 +32,7 @@ from skidyn.measurement._results import Results
 if TYPE_CHECKING:
     from skidyn.measurement._divided import Division
     from skidyn.measurement._fits import Fits
+    from skidyn.measurement._odd_motion import MotionByRecording
     from skidyn.robots import Robot
 
 
@@ -289,17 +290,27 @@ class Measurement:
         ]
 
     @cached_property
-    def odd_motion(self) -> dict[int, dict[int, float]]:
-        """Recordings in which velocities are not the usual multiple of the rate of positions."""
+    def motion_by_recording(self) -> MotionByRecording | None:
+        """How velocities follow positions in every recording; None with too few to compare."""
         if len(self.leaps) or self.lost:
-            return {}  # parts between leaps have no numbers of their own
-        from skidyn.measurement._odd_motion import odd_motion
+            return None  # parts between leaps have no numbers of their own
+        from skidyn.measurement._odd_motion import FEWEST, MotionByRecording
 
+        if len(np.unique(self.whole.trajectory)) < FEWEST:
+            return None
         kept = ~self.idle
         whole, q = self.whole, self.unwrapped
         if not kept.all():
             whole, q = whole.take(kept), q[kept]
-        return odd_motion(whole, q, self.velocity_steps)
+        return MotionByRecording.of(whole, q, self.velocity_steps)
+
+    @cached_property
+    def odd_motion(self) -> dict[int, dict[int, float]]:
+        """Recordings in which velocities are not the usual multiple of the rate of positions."""
+        from skidyn.measurement._odd_motion import odd_motion
+
+        motion = self.motion_by_recording
+        return {} if motion is None else odd_motion(motion)
 
     @cached_property
     def unwrapped(self) -> Array:

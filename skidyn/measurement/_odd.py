@@ -227,7 +227,8 @@ def _sizes(measurement: Measurement) -> dict[int, float]:
 def _silent(measurement: Measurement) -> list[int]:
     """Recordings in which joints move as in the others, but all torques are noise near zero."""
     signals, torque = measurement.signals, measurement.torque
-    runs = np.unique(signals.trajectory)
+    runs, counts = np.unique(signals.trajectory, return_counts=True)
+    runs = runs[counts >= FEWEST]
     if len(runs) < 3:
         return []
     parts = [signals.trajectory == run for run in runs]

@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
 from skidyn.measurement._check import Check
@@ -44,7 +46,8 @@ class OddMotion(Check):
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         if measurement.clock != 1:
             return  # what is short or a gap is another in the wrong unit
-        rates = own_rates(measurement.signals)
+        motion = measurement.motion_by_recording
+        rates = {} if motion is None else own_rates(motion)
         if rates:
             measurement.stale = True  # no value is that of its time
             told = ", ".join(f"{rate:.3g} in {run}" for run, rate in rates.items())
@@ -83,32 +86,72 @@ class OddMotion(Check):
             )
 
 
-def own_rates(signals: Signals) -> dict[int, float]:
+@dataclass(frozen=True)
+class MotionByRecording:
+    """How velocities follow positions in every recording.
+
+    Attributes
+    ----------
+    runs : ndarray of shape (n_recordings,)
+        Numbers of the recordings.
+    slopes, likeness : ndarray of shape (n_recordings, n_joints)
+        Slope of integrated velocity on position, and their correlation.
+    way : ndarray of shape (n_recordings, n_joints)
+        Range of the positions, rad or m; NaN where a coarse velocity is hardly resolved.
+    """
+
+    runs: NDArray[np.int64]
+    slopes: Array
+    likeness: Array
+    way: Array
+
+    @classmethod
+    def of(cls, signals: Signals, position: Array, steps: Sequence[float]) -> MotionByRecording:
+        """Motion of all recordings.
+
+        Parameters
+        ----------
+        signals : Signals
+            Recorded motion.
+        position : ndarray of shape (n_samples, n_joints)
+            Positions without leaps by a turn.
+        steps : sequence of float
+            Steps of coarse velocities, NaN for others.
+        """
+        number = signals.trajectory
+        runs, n = np.unique(number), signals.n_joints
+        slopes, likeness, way = (np.full((len(runs), n), np.nan) for _ in range(3))
+        for r, run in enumerate(runs):
+            parts = [rows for rows in signals.segments if number[rows.start] == run]
+            for k in range(n):
+                slopes[r, k], likeness[r, k] = velocity_consistency(
+                    signals.clock, position[:, k], signals.dq[:, k], parts
+                )
+                if not np.ptp(signals.dq[number == run, k]) < RESOLVED * steps[k]:
+                    way[r, k] = np.ptp(position[number == run, k])
+        return cls(runs, slopes, likeness, way)
+
+
+def own_rates(motion: MotionByRecording) -> dict[int, float]:
     """Slopes of velocity on differentiated position if they differ from recording to recording.
 
     A clock is that of all joints: on each joint, the slopes have to be the same.
 
     Parameters
     ----------
-    signals : Signals
-        Recorded motion.
+    motion : MotionByRecording
+        Slopes of all joints.
 
     Returns
     -------
     dict of int to float
         By recording; empty if most recordings have the same, or joints differ.
     """
-    runs = np.unique(signals.trajectory)
-    if len(runs) < FEWEST:
-        return {}
     rates = {}
-    for run in runs.tolist():
-        parts = [rows for rows in signals.segments if signals.trajectory[rows.start] == run]
-        found = [
-            velocity_consistency(signals.clock, signals.q[:, k], signals.dq[:, k], parts)
-            for k in range(signals.n_joints)
-        ]
-        own = np.array([slope for slope, likeness in found if likeness > ALIKE])
+    for run, slopes, likeness in zip(
+        motion.runs.tolist(), motion.slopes, motion.likeness, strict=True
+    ):
+        own = slopes[likeness > ALIKE]
         if len(own) < 2 or not np.ptp(own) < SAME * abs(float(np.median(own))):
             return {}
         rates[run] = float(np.median(own))
@@ -116,40 +159,22 @@ def own_rates(signals: Signals) -> dict[int, float]:
     return rates if np.mean(off > OTHER) > 1 - MOST else {}
 
 
-def odd_motion(
-    signals: Signals, position: Array, steps: Sequence[float]
-) -> dict[int, dict[int, float]]:
+def odd_motion(motion: MotionByRecording) -> dict[int, dict[int, float]]:
     """Slopes of integrated velocity on position in recordings in which it is not the usual one.
 
     Parameters
     ----------
-    signals : Signals
-        Recorded motion.
-    position : ndarray of shape (n_samples, n_joints)
-        Positions without leaps by a turn.
-    steps : sequence of float
-        Steps of coarse velocities, NaN for others.
+    motion : MotionByRecording
+        Slopes of all joints.
 
     Returns
     -------
     dict of int to dict of int to float
         By recording and joint, from 0; NaN where the velocity is not that of the joint at all.
     """
-    runs = np.unique(signals.trajectory)
-    n = signals.n_joints
+    runs, slopes, likeness, way = motion.runs, motion.slopes, motion.likeness, motion.way
     if len(runs) <= FEWEST:
         return {}
-    slopes, likeness, way = (np.full((len(runs), n), np.nan) for _ in range(3))
-    for r, run in enumerate(runs):
-        number = signals.trajectory
-        parts = [rows for rows in signals.segments if number[rows.start] == run]
-        for k in range(n):
-            dq, own = signals.dq[:, k], signals.dq[number == run, k]
-            slopes[r, k], likeness[r, k] = velocity_consistency(
-                signals.clock, position[:, k], dq, parts
-            )
-            if not np.ptp(own) < RESOLVED * steps[k]:
-                way[r, k] = np.ptp(position[number == run, k])
     found: dict[int, dict[int, float]] = {}
     for k in np.flatnonzero(np.isfinite(way).any(axis=0)).tolist():
         moves = way[:, k] > MOVED * np.nanmedian(way[:, k])

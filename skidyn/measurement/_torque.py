@@ -150,23 +150,29 @@ def _unsigned(measurement: Measurement) -> tuple[list[int], dict[int, float]]:
 
 
 def signed_by_velocity(measurement: Measurement) -> list[int]:
-    """Columns of the torque that never oppose the motion, and grow where bodies do so strongly.
+    """Columns of the torque, from 0, that never oppose the motion, and grow where bodies do.
 
     The torque of a joint with much friction does not oppose it either, but becomes smaller there.
     """
     robot, signals = measurement.robot, measurement.signals
     if robot is None or not measurement.readable:
         return []
-    bodies = robot.inverse_dynamics(signals.q, signals.dq, signals.ddq)
+    fast = np.abs(signals.dq) > SLOW * np.abs(signals.dq).max(axis=0)
+    along = [
+        k
+        for k in np.flatnonzero(measurement.excited).tolist()
+        if np.mean((measurement.torque[:, k] * signals.dq[:, k])[fast[:, k]] > 0) > ALWAYS
+    ]
+    if not along:
+        return []
     found = []
-    for k in np.flatnonzero(measurement.excited).tolist():
-        torque, speed = measurement.torque[:, k], signals.dq[:, k]
-        fast = np.abs(speed) > SLOW * np.abs(speed).max()
-        own = bodies[:, k] * np.sign(speed)
-        against = fast & (own < -STRONGLY * np.std(bodies[:, k]))
-        if against.sum() < FEWEST_AGAINST or not np.mean(torque[fast] * speed[fast] > 0) > ALWAYS:
+    bodies = robot.inverse_dynamics(signals.q, signals.dq, signals.ddq)
+    for k in along:
+        own = bodies[:, k] * np.sign(signals.dq[:, k])
+        against = fast[:, k] & (own < -STRONGLY * np.std(bodies[:, k]))
+        if against.sum() < FEWEST_AGAINST:
             continue
-        size, opposing = np.abs(torque[against]), -own[against]
+        size, opposing = np.abs(measurement.torque[against, k]), -own[against]
         if np.ptp(size) and np.ptp(opposing) and np.corrcoef(size, opposing)[0, 1] > GROWS:
             found.append(k)
     return found

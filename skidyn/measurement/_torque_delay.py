@@ -113,7 +113,7 @@ class TorqueDelay(Check):
         same = use & (np.abs(slow - fast) < np.maximum(ALIKE, SAME * np.abs(found.joints)))
         agreeing, n_alike = _agree(found, same)
         if not agreeing and _all_alike(found, use):
-            agreeing, n_alike = _agree(found, use)
+            agreeing, n_alike = True, fits.n_joints
         # if positions are late, the torque is early by the same time
         early = measurement.late_position
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):

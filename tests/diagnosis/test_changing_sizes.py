@@ -27,6 +27,7 @@ def test_a_torque_whose_sign_differs_between_recordings_is_found():
     assert set(finding.variables) == {"q2", "trajectory"}
     assert "another size in each recording, on joint 1." in finding.sentence
     assert finding.error_drop > 0.7
+    assert finding.trajectories is None
 
 
 def test_a_torque_of_one_size_is_the_same_in_all_recordings():

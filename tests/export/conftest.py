@@ -47,9 +47,11 @@ STATIC = (
     Term("coupled_friction", (1, 2), {"ratio": -0.5}),
     Term("coupled_inertia", (1, 2), {"ratio": 0.5}),
     Term("coupling_spring", (1, 2), {"ratio": 1.0}),
+    Term("coupling_spring", (1, 2), {"ratio": -1.0, "x0": 0.1, "bent": 1.0}),
     Term("nonlinear_spring", (1,), {"q_middle": 0.2}),
     ("gravity_compensator", [2]),
     Term("end_stop", (2,), {"q_lim": 0.3, "side": 1.0}),
+    Term("end_stop", (1,), {"q_lim": 0.3, "side": 1.0, "q_further": 0.8}),
     Term("saturation", (1,), {"limit": 0.5}),
     Term("saturation", (2,), {"limit": 0.5, "limit_below": 0.4}),
 )
