@@ -562,15 +562,26 @@ class RankingSearch(SearchState):
         """Effects of few recordings as known effects, those of many recordings as unknown.
 
         Separate sizes in many recordings can be due to any missing slow torque, unless the
-        remainder of the joint is white.
+        remainder of the joint is white, or they explain nearly all that is missing on it.
         """
         most, white = self.settings.most_recordings, self.settings.white
         few, drift, many = [], [], []
         for part in grouped_by_joints(chosen):
-            named = len(part) <= most or self._price(part) <= white
+            named = len(part) <= most or self._price(part) <= white or self._leaves_little(part)
             changes = drifting(self.problem, self.kinds, part) if named else []
             drift += changes
             few += part if named and not changes else []
             many += [] if named else part
         many = [replace(c, kind=UNKNOWN, variables=("trajectory",)) for c in many]
         return [part for part in (few, drift, many) if part]
+
+    def _leaves_little(self, part: Sequence[Candidate]) -> bool:
+        """Whether effects of a kind that does not follow any torque remove nearly all the error."""
+        if part[0].kind in FOLLOWS_ANY:
+            return False
+        joints = sorted({j for c in part for j in c.joints})
+        had, has = (
+            sum(float(tester.residual[j] @ tester.residual[j]) for j in joints)
+            for tester in (self.tester(self.chosen), self.tester([*self.chosen, *part]))
+        )
+        return has < (1 - ALL_LEFT) * had

@@ -34,8 +34,9 @@ from skidyn.diagnosis._rule import (
     CHANGE_SHARE,
     GUESS,
     LITTLE,
-    LITTLE_NAMELESS,
+    LITTLE_OF_DERIVATIVES,
     MUCH,
+    REMAINDER_PREDICTABLE_SHARE,
     SURE_OF_LITTLE,
     UNLIKELY,
     false_discovery_rate,
@@ -199,11 +200,28 @@ def _impossible(
 
 
 def slight(
-    problem: Problem, findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
+    problem: Problem,
+    findings: Sequence[Hypothesis],
+    intervals: dict[Term, dict[str, Any]],
+    errors: Sequence[float],
+    ranges: Array,
 ) -> dict[int, str]:
     """Indices of findings that are too small to be significant for the robot, with remarks.
 
     They remain in the completed model, with which later effects were found.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and folds on which effects are judged.
+    findings : sequence of Hypothesis
+        Findings.
+    intervals : dict
+        Parameters of every term, with intervals.
+    errors : sequence of float
+        Error of every joint with all findings, N m or N.
+    ranges : ndarray of shape (n_joints,)
+        Range of the measured torque, N m or N.
     """
     remarks = {}
     for i, hypothesis in enumerate(findings):
@@ -212,13 +230,36 @@ def slight(
             told = intervals[candidate.term]
             found = {name: v for name, v in told.items() if isinstance(v, tuple)}
             reasons.append(candidate.term.effect.too_small(found, problem.signals))
-        if reasons and all(reasons):
+        if _in_the_noise(hypothesis, errors, ranges):
+            remarks[i] = _wave_told(hypothesis)
+        elif reasons and all(reasons):
             where = joints_told(j + 1 for j in hypothesis.joints)
             remarks[i] = (
                 f"{get_effect(hypothesis.kind).title} on {where}: {reasons[0]}. It is part of the "
                 "completed model and is not counted as a finding."
             )
     return remarks
+
+
+def _in_the_noise(hypothesis: Hypothesis, errors: Sequence[float], ranges: Array) -> bool:
+    """Whether it is a wave in time that is smaller than the noise and small for every joint.
+
+    Mains hum and fans are in the signals of sensors, without a torque.
+    """
+    if hypothesis.torque is None or hypothesis.kind != UNKNOWN:
+        return False
+    sizes = [(j, np.sqrt(np.mean(hypothesis.torque[:, j] ** 2))) for j in hypothesis.joints]
+    return all(a < min(errors[j], REMAINDER_PREDICTABLE_SHARE * ranges[j]) for j, a in sizes)
+
+
+def _wave_told(hypothesis: Hypothesis) -> str:
+    """Remark on a wave in the noise."""
+    waves = sorted({f"{c.term.shape['frequency']:.3g}" for c in hypothesis.candidates})
+    where = joints_told(j + 1 for j in hypothesis.joints)
+    return (
+        f"The torque of {where} contains a wave of {' and '.join(waves)} Hz that is smaller than "
+        "the noise, such as hum in a sensor. It is not counted as a finding."
+    )
 
 
 def guess(diagnosis: Diagnosis) -> Withdrawal | None:
@@ -249,9 +290,10 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
                 likely = of_significant(likely, min(f.q_value or 0.0 for f in of_kind))
             equalled = bool(finding.rivals) and finding.margin < ABOVE
             likely *= (1 + finding.alike + equalled) * (1 + len(finding.elsewhere))
-        little = LITTLE if finding.kind != UNKNOWN else LITTLE_NAMELESS
+        moves = any(term.effect.moves_link for term in finding.terms)
+        little = LITTLE_OF_DERIVATIVES if moves or finding.kind == UNKNOWN else LITTLE
         little *= _share_of_samples(diagnosis.problem, finding.trajectories)
-        if drop < little and likely < SURE_OF_LITTLE:
+        if drop < little and (moves or likely < SURE_OF_LITTLE):
             return False
         return likely >= GUESS or finding.error_drop >= GUESS
 
