@@ -147,8 +147,7 @@ def conclude(
         shown, remark = _refitted(problem, result, model, data, shown)
         remarks.append(remark)
     unknowns = _unknowns(problem, result, terms)
-    ranges = torque_range(torque)
-    unlisted = slight(problem, result.findings, intervals, history[-1]["rmse"], ranges)
+    unlisted = slight(problem, result.findings, intervals, history[-1]["rmse"])
     remarks += unlisted.values()
     findings = []
     for i, hypothesis in enumerate(result.findings):
@@ -167,7 +166,9 @@ def conclude(
     share = predictable_share(problem, result.fit.residual)
     rmse = np.array(history[-1]["rmse"])
     parts = find_remainder(problem, result.fit, noise, torque, rmse, share)
-    least = np.maximum(EPISODE_LEAST_RANGE * ranges, EPISODE_LEAST_NOISE * parts.noise)
+    least = np.maximum(
+        EPISODE_LEAST_RANGE * torque_range(torque), EPISODE_LEAST_NOISE * parts.noise
+    )
     smooth = away_from_reversals(problem, result.fit.residual, sliding)
     # On a joint with a finding, large local residuals are errors of its imperfect formula.
     taken = {j for h in result.findings for c in h.candidates for j in c.rows}

@@ -36,7 +36,6 @@ from skidyn.diagnosis._rule import (
     LITTLE,
     LITTLE_OF_DERIVATIVES,
     MUCH,
-    REMAINDER_PREDICTABLE_SHARE,
     SURE_OF_LITTLE,
     UNLIKELY,
     false_discovery_rate,
@@ -204,7 +203,6 @@ def slight(
     findings: Sequence[Hypothesis],
     intervals: dict[Term, dict[str, Any]],
     errors: Sequence[float],
-    ranges: Array,
 ) -> dict[int, str]:
     """Indices of findings that are too small to be significant for the robot, with remarks.
 
@@ -220,8 +218,6 @@ def slight(
         Parameters of every term, with intervals.
     errors : sequence of float
         Error of every joint with all findings, N m or N.
-    ranges : ndarray of shape (n_joints,)
-        Range of the measured torque, N m or N.
     """
     remarks = {}
     for i, hypothesis in enumerate(findings):
@@ -230,7 +226,7 @@ def slight(
             told = intervals[candidate.term]
             found = {name: v for name, v in told.items() if isinstance(v, tuple)}
             reasons.append(candidate.term.effect.too_small(found, problem.signals))
-        if _in_the_noise(hypothesis, errors, ranges):
+        if _in_the_noise(hypothesis, errors):
             remarks[i] = _wave_told(hypothesis)
         elif reasons and all(reasons):
             where = joints_told(j + 1 for j in hypothesis.joints)
@@ -241,15 +237,15 @@ def slight(
     return remarks
 
 
-def _in_the_noise(hypothesis: Hypothesis, errors: Sequence[float], ranges: Array) -> bool:
-    """Whether it is a wave in time that is smaller than the noise and small for every joint.
+def _in_the_noise(hypothesis: Hypothesis, errors: Sequence[float]) -> bool:
+    """Whether it is a wave in time that is smaller than the rest of the noise on every joint.
 
     Mains hum and fans are in the signals of sensors, without a torque.
     """
     if hypothesis.torque is None or hypothesis.kind != UNKNOWN:
         return False
-    sizes = [(j, np.sqrt(np.mean(hypothesis.torque[:, j] ** 2))) for j in hypothesis.joints]
-    return all(a < min(errors[j], REMAINDER_PREDICTABLE_SHARE * ranges[j]) for j, a in sizes)
+    waves = hypothesis.torque
+    return all(np.sqrt(np.mean(waves[:, j] ** 2)) < errors[j] for j in hypothesis.joints)
 
 
 def _wave_told(hypothesis: Hypothesis) -> str:
