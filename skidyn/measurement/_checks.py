@@ -56,6 +56,7 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd import OddRecording
 from skidyn.measurement._odd_motion import OddMotion
 from skidyn.measurement._overflow import OverflowedTorque
+from skidyn.measurement._padding import PaddedRows
 from skidyn.measurement._rate import GravityOnly
 from skidyn.measurement._slow_torque import SlowTorque
 from skidyn.measurement._smoothing import SmoothedTorque
@@ -70,6 +71,7 @@ from skidyn.measurement._velocity_delay import VelocityDelay
 UNSIGNED = UnsignedTorque()
 #: The only list of checks in skidyn.
 CHECKS: tuple[Check, ...] = (
+    PaddedRows(),
     FailedReads(),
     DescriptionLengths(),
     DescriptionUnits(),

@@ -37,6 +37,9 @@ CLOSER = 1.1
 MISSING, ROUNDED = 0.05, 1.5
 #: Share of rows that repeat the previous one, or lie on a line between their neighbours.
 REPEATED, ON_A_LINE = 0.02, 0.3
+#: Rounding error of numbers of seven digits, relative to the largest; how many times this a bend is
+#: at least, but for some rows, as a share of those on a line, if rows were interpolated.
+FEW_DIGITS, CLEARLY, NOT_BENT = 2e-6, 10.0, 1.15
 #: How near the share of the other rows is to one in a whole number to be that.
 NEARLY = 0.1
 #: Share of rows with the stamp of the previous row from which the stamps are too coarse.
@@ -405,16 +408,35 @@ class InterpolatedRows(Check):
 def _on_a_line(signals: Signals, values: Array) -> tuple[int, int, int]:
     """Rows in which channels change, those in which they lie between their neighbours, and knots.
 
-    A knot between two rows bends the channels in both, which are one knot together.
+    A knot between two rows bends the channels in both, which are one knot together. Values of few
+    digits lie beside a line by as much as these; a bend of any size is as frequent as a smaller one
+    where the motion itself is smooth.
+    """
+    exact = _straight(signals, values, 0.0, 1.0)
+    rounded, wider = (_straight(signals, values, FEW_DIGITS, times) for times in (1.0, CLEARLY))
+    return rounded if wider[1] < NOT_BENT * rounded[1] else exact
+
+
+def _straight(
+    signals: Signals, values: Array, rounding: float, times: float
+) -> tuple[int, int, int]:
+    """Changing rows, those on a line, and knots, for values of some relative rounding error.
+
+    Bends of so many times the tolerance are accepted.
     """
     on_line, moving, knots = 0, 0, 0
+    largest = np.abs(values).max(axis=0, initial=0.0)
     for rows in signals.segments:
         own, time = values[rows], signals.clock[rows]
         if len(own) < 10:
             continue
-        slope = np.diff(own, axis=0) / np.diff(time)[:, None]
-        moves = np.abs(slope[1:]) > 1e-3 * np.abs(slope).max(axis=0) + 1e-12
-        bend = np.abs(np.diff(slope, axis=0)) <= 1e-6 * np.abs(slope).max(axis=0)
+        steps = np.diff(time)
+        slope = np.diff(own, axis=0) / steps[:, None]
+        fastest = np.abs(slope).max(axis=0)
+        moves = np.abs(slope[1:]) > 1e-3 * fastest + 1e-12
+        least = rounding * largest / float(np.median(steps))
+        least = times * np.clip(least, 1e-6 * fastest, 1e-3 * fastest)
+        bend = np.abs(np.diff(slope, axis=0)) <= least
         both = moves.sum(axis=1) >= 2
         straight = np.all(bend | ~moves, axis=1)
         moving += int(both.sum())

@@ -44,6 +44,8 @@ TELLING = 0.15
 DRIVES = 20.0
 #: Factors of units of torque.
 UNITS = {1e3: "Nmm", 1e2: "Ncm", 1e-3: "kNm"}
+#: How many times a unit's factor the scale of a joint may be, whose bodies are not those stated.
+SAME_UNIT = 2.0
 #: That of torques beyond what their joints can have.
 KILO = 1e3
 
@@ -94,8 +96,12 @@ class TorqueScale(Check):
             if k in known or abs(np.log(gain / typical)) < np.log(DRIVES)
         }
         told = ", ".join(f"{measurement.joint_names[k]} {gain:.3g}" for k, gain in gains.items())
-        unit = next((u for f, u in UNITS.items() if abs(np.log(typical / f)) < 0.3), None)
-        if unit is not None:
+        unit, factor = next(
+            ((u, f) for f, u in UNITS.items() if abs(np.log(typical / f)) < 0.3), (None, 1.0)
+        )
+        # the same unit in all columns; motors have several scales
+        alike = all(abs(np.log(gain / factor)) < np.log(SAME_UNIT) for gain in gains.values())
+        if unit is not None and alike:
             yield self.suspicion(
                 f"torque looks like {unit}",
                 f"it is the rigid-body torque times {told}",

@@ -34,6 +34,8 @@ FAR, DISTANT = 1.5, 4.0
 MILLIMETRES = 20.0
 #: Largest positions, rad, that would hardly be a motion if they were degrees.
 LEAST_DEGREES = 6.0
+#: Positions, rad, beyond which a joint with limits is not in another place.
+SEVERAL_TURNS = 4 * np.pi
 #: How nearly a factor is a round number that it is taken for.
 WHOLE = 2e-3
 #: First and last step of the search for the logarithm of a size at which identified bodies fit
@@ -262,7 +264,9 @@ class PositionUnit(Check):
                 np.flatnonzero(outside),
             )
         elif degrees:
-            certain = bool((outside & known).any()) or usual > 25
+            # a single joint may have another zero, or the name of another one
+            whole = joints is None or bool(np.all(largest[outside] > SEVERAL_TURNS))
+            certain = (bool((outside & known).any()) and whole) or usual > 25
             yield self.suspicion(
                 "positions look like degrees",
                 f"{seen}; read as degrees it would be {largest[k] * DEGREE:.3g} rad",

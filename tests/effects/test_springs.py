@@ -118,3 +118,22 @@ def test_a_second_spring_sets_in_behind_a_soft_bumper(signals, columns_of):
     assert len(effect.coefficients_of({})) == 1
     joints, stop = (0,), {"q_lim": 0.0, "side": 1.0}
     assert not effect.admissible(signals, joints, stop | {"q_further": -0.1})
+
+
+def test_a_coil_spring_between_two_points_of_the_links(signals, columns_of):
+    q, near, far, free, stiffness, zero = signals.q[:, 0], 0.12, 0.4, 0.25, 300.0, -1.1
+    length = np.sqrt(near**2 + far**2 - 2 * near * far * np.cos(q - zero))
+    torque = stiffness * (length - free) * near * far * np.sin(q - zero) / length
+    columns = columns_of("gravity_compensator", signals, aligned=zero, lever=near / far)
+    size = stiffness * near * far
+    np.testing.assert_allclose(columns @ [size, size * free / far, 0.0], torque, atol=1e-12)
+
+
+def test_a_counterweight_and_its_second_harmonic(signals, columns_of):
+    q = signals.q[:, 0]
+    one = columns_of("gravity_compensator", signals)
+    np.testing.assert_allclose(one @ [3.0, 4.0, 1.0], 3 * np.sin(q) + 4 * np.cos(q) + 1)
+    two = columns_of("gravity_compensator", signals, overtone=1.0)
+    effect = get_effect("gravity_compensator")
+    assert [c.name for c in effect.coefficients_of({"overtone": 1.0})][2:4] == ["a2", "b2"]
+    np.testing.assert_allclose(two[:, 2:4], np.column_stack([np.sin(2 * q), np.cos(2 * q)]))

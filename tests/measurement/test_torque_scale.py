@@ -17,6 +17,11 @@ def test_torque_in_newton_millimetres(signals, torque, found, only):
     only(found(signals, 1e3 * torque), "torque_scale", "certain", "--units tau=Nmm")
 
 
+def test_another_scale_of_each_joint_is_not_a_unit(signals, torque, found):
+    told = {s.check: s for s in found(signals, torque * [40.0, 110.0])}["torque_scale"]
+    assert told.certainty == "suspected" and "motor currents" in told.suspicion
+
+
 def test_currents(signals, torque, found):
     told = [s for s in found(signals, torque * 0.05) if s.check == "torque_scale"]
     assert told and "motor currents" in told[0].suspicion
