@@ -22,6 +22,20 @@ def test_a_finding_is_as_uncertain_as_the_comparison_on_its_own_joint(without_fr
     assert found[1,].margin < found[2,].margin
 
 
+@pytest.mark.parametrize("free", [0.0, 0.3])
+def test_a_gravity_compensator_is_no_nonlinear_spring(without_friction, free):
+    """With a free length or without, within the travel of an arm."""
+    arm = without_friction
+    angle = arm.q[:, 1] - arm.q[:, 1].mean() + 1.0
+    length = np.sqrt(0.3**2 + 0.4**2 - 2 * 0.3 * 0.4 * np.cos(angle))
+    torque = arm.torque.copy()
+    torque[:, 1] += 3.0 * arm.size[1] * np.sin(angle) * (1 - free / length)
+
+    findings = diagnose(RBDRegressor(arm.robot, ()), arm.X, torque, checks=()).findings
+
+    assert [(f.kind, f.joints) for f in findings] == [("gravity_compensator", (2,))]
+
+
 @pytest.mark.slow
 def test_a_spring_of_one_joint_is_not_a_coupling_of_a_large_ratio():
     """A coupling of several pairs explains more than springs, but not on each of the pairs."""

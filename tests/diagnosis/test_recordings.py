@@ -43,6 +43,17 @@ def test_a_gain_that_changed_for_some_recordings(log):
     assert found(log, torque) == {("torque_gain", (2,))}
 
 
+def test_a_gain_with_another_size_in_every_recording(log):
+    """The rest is noise that is correlated in time, so that it is not white."""
+    gain = 1 + 0.3 * np.random.default_rng(2).normal(size=10)
+    rows = np.random.default_rng(5).normal(0.0, 0.004, len(log.y) + 63)
+    torque = np.array(log.y)
+    torque[:, 1] *= gain[log.X["trajectory"].to_numpy() - 1]
+    torque[:, 1] += np.std(torque[:, 1]) * np.convolve(rows, np.ones(64) / 8, "valid")
+
+    assert found(log, torque) == {("torque_gain", (2,))}
+
+
 def test_friction_of_the_model_may_have_another_level(log):
     q, dq = (log.X[[f"{name}{j}" for j in (1, 2)]].to_numpy() for name in ("q", "dq"))
     run, time = log.X["trajectory"].to_numpy(), log.X["time"].to_numpy()

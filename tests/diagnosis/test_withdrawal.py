@@ -37,6 +37,19 @@ def test_a_delay_within_half_a_sampling_step_is_a_remark_and_no_finding(delay, i
     assert diagnosis.verdict == ("missing" if is_named else "complete")
 
 
+@pytest.mark.parametrize(("share", "is_named"), [(0.5, False), (3.0, True)])
+def test_hum_that_is_smaller_than_the_noise_is_a_remark_and_no_finding(share, is_named):
+    log = make_hidden_effect_log(load_planar_arm(), None, noise="high", random_state=4)
+    noise = diagnose(RBDRegressor(log.robot), log.X, log.y, effects=[], checks=()).noise
+    hum = np.sqrt(2) * share * np.sin(2 * np.pi * 23.0 * log.X["time"].to_numpy())
+
+    diagnosis = diagnose(RBDRegressor(log.robot), log.X, log.y + hum[:, None] * noise, checks=())
+
+    assert {f.variables for f in diagnosis.findings} == ({("time",)} if is_named else set())
+    assert any("wave of 23 Hz" in note for note in diagnosis.warnings) != is_named
+    assert diagnosis.verdict == ("unknown" if is_named else "complete")
+
+
 @pytest.mark.slow
 def test_what_was_significant_beside_a_withdrawn_function_only_is_not_named(arm_log, found_in):
     """A function of the noisy accelerations of coarse encoders does not predict samples better."""
