@@ -576,8 +576,8 @@ class RankingSearch(SearchState):
         return [part for part in (few, drift, many) if part]
 
     def _leaves_little(self, part: Sequence[Candidate]) -> bool:
-        """Whether effects of a kind that does not follow any torque remove nearly all the error."""
-        if part[0].kind in FOLLOWS_ANY:
+        """Whether effects that vary within recordings remove nearly all the error."""
+        if part[0].kind == "offset":
             return False
         joints = sorted({j for c in part for j in c.joints})
         had, has = (
