@@ -26,6 +26,8 @@ RANKED = 8
 STRETCH, LEAST_ROWS = 1.0, 8
 #: An effect that removes a smaller share of the held-out squared error of samples is not listed.
 LEAST_DROP = 0.02
+#: Number of digits of the shares by which effects are ranked.
+EQUAL = 3
 
 
 @dataclass(frozen=True)
@@ -152,7 +154,7 @@ class Session(Seen):
         Returns
         -------
         list of RankedEffect
-            The best candidate of every kind; of equal ones, the simpler is first.
+            The best candidate of every kind; of equal ones, to a thousandth, the simpler is first.
         """
         j = self._joint(joint)
         found = self._held_out(j)
@@ -365,4 +367,4 @@ def _shown(candidate: Candidate, drop: float, drop_here: float) -> RankedEffect:
 
 
 def _order(effect: RankedEffect) -> tuple[float, int]:
-    return -effect.drop_here, get_effect(effect.kind).simplicity
+    return -round(effect.drop_here, EQUAL), get_effect(effect.kind).simplicity

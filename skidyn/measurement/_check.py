@@ -41,7 +41,7 @@ class Check(ABC):
     --------
     >>> from skidyn.measurement import list_checks
     >>> list_checks()[0].name
-    'failed_reads'
+    'padded'
     """
 
     name: ClassVar[str]

@@ -40,7 +40,7 @@ def swings(amplitudes, seed):
 X, Y = swings([0.35, 0.45, 0.5, 0.6, 0.65, 0.7], 0)
 WIDE, WIDE_TORQUE = swings([3.0], 1)
 MODEL = RBDRegressor(PENDULUM, trajectory=0, time=1)
-SEARCH = EffectSearchCV(MODEL, effects=("gravity_compensator", "nonlinear_spring"), cv=3)
+SEARCH = EffectSearchCV(MODEL, effects=("nonlinear_spring",), cv=3)  # grows without bound
 
 
 def error(model):
