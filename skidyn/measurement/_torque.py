@@ -200,8 +200,9 @@ def _magnitude_gain(fits: Fits, k: int) -> float:
     return best - plain if np.isfinite(best) else 0.0
 
 
-#: Least share of the residual torque that another zero must remove to be certain.
-MOSTLY = 0.8
+#: Least share of the residual torque that a correction must remove to be certain, and corrections
+#: like which a missing offset, spring or coupling looks.
+MOSTLY, LIKE_EFFECTS = 0.8, ("zero", "no_gravity")
 
 
 class Columns(Check):
@@ -249,8 +250,8 @@ class Columns(Check):
             f"{best.gain:.0f} (log-likelihood) and leaves {100 * best.drop:.0f} % less residual"
         )
         certainty: Certainty = "certain" if _sure(changes) else "suspected"
-        if kind == "zero" and min(change.drop for change in changes) < MOSTLY:
-            certainty = "suspected"  # an offset or a spring that is missing looks like it
+        if kind in LIKE_EFFECTS and min(change.drop for change in changes) < MOSTLY:
+            certainty = "suspected"
         rivals = {_RIVALS[rival] for change in changes for rival in change.rivals}
         if rivals:
             certainty = "suspected"
