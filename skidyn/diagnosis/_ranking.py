@@ -579,9 +579,7 @@ class RankingSearch(SearchState):
         """Whether effects that vary within recordings remove nearly all the error."""
         if part[0].kind == "offset":
             return False
-        joints = sorted({j for c in part for j in c.joints})
-        had, has = (
-            sum(float(tester.residual[j] @ tester.residual[j]) for j in joints)
-            for tester in (self.tester(self.chosen), self.tester([*self.chosen, *part]))
-        )
+        tester, joints = self.tester(self.chosen), {j for c in part for j in c.joints}
+        left = tester.beside([c.rows for c in part]).residual
+        had, has = (sum(float(r[j] @ r[j]) for j in joints) for r in (tester.residual, left))
         return has < (1 - ALL_LEFT) * had

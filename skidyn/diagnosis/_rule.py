@@ -80,8 +80,9 @@ MASKED, SURE, ROUNDS = 0.3, 1e-9, 3
 #: acts on a single joint takes back all of it.
 TAKEN_BACK = 0.5
 #: Share of what is left on several joints that an effect must remove not to be an error of earlier,
-#: imperfect formulas, though the rest is not white (``_acceptance.py``); and share of what a load
-#: in intervals removes above which it acts on a single joint (``_ranking.py``).
+#: imperfect formulas, though the rest is not white (``_acceptance.py``); share of what a load in
+#: intervals removes above which it acts on a single joint, and share of the error that an effect
+#: with another size in each of many recordings must remove to keep its name (``_ranking.py``).
 ALL_LEFT = 0.9
 #: Share of the error that an explanation must remove beside free functions of the signals of
 #: earlier effects, over that without these, not to be an error of their formulas

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn._text import joints_told
+from skidyn._text import joints_told, listed
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._confidence import ABOVE, of_significant
 from skidyn.diagnosis._findings import Finding
@@ -26,9 +26,11 @@ from skidyn.diagnosis._hypothesis import (
     Hypothesis,
     SearchResult,
     found_terms,
+    is_vibration,
     on_samples,
     within_recordings,
 )
+from skidyn.diagnosis._remainder import root_mean_square
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._rule import (
     CHANGE_SHARE,
@@ -45,6 +47,8 @@ from skidyn.diagnosis._tester import Tester
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 
+#: What is said of findings that are not listed.
+UNLISTED = "It is not counted as a finding; the errors stated here are those without it."
 #: Terms of one finding that are to be withdrawn.
 Withdrawal = tuple[Hypothesis, list[Candidate]]
 
@@ -206,7 +210,8 @@ def slight(
 ) -> dict[int, str]:
     """Indices of findings that are too small to be significant for the robot, with remarks.
 
-    They remain in the completed model, with which later effects were found.
+    They remain in the model with which later effects were found and errors are stated, and are not
+    part of :attr:`Diagnosis.model`.
 
     Parameters
     ----------
@@ -226,36 +231,30 @@ def slight(
             told = intervals[candidate.term]
             found = {name: v for name, v in told.items() if isinstance(v, tuple)}
             reasons.append(candidate.term.effect.too_small(found, problem.signals))
-        if _in_the_noise(hypothesis, errors):
-            remarks[i] = _wave_told(hypothesis)
-        elif reasons and all(reasons):
-            where = joints_told(j + 1 for j in hypothesis.joints)
-            remarks[i] = (
-                f"{get_effect(hypothesis.kind).title} on {where}: {reasons[0]}. It is part of the "
-                "completed model and is not counted as a finding."
+        where = joints_told(j + 1 for j in hypothesis.joints)
+        if is_vibration(hypothesis) and _in_the_noise(hypothesis, errors):
+            lines = {f"{c.term.shape['frequency']:.3g}" for c in hypothesis.candidates}
+            waves = listed(sorted(lines, key=float))
+            remark = (
+                f"The torque of {where} contains a wave of {waves} Hz that is smaller than the "
+                "noise, such as hum in a sensor"
             )
+        elif reasons and all(reasons):
+            remark = f"{get_effect(hypothesis.kind).title} on {where}: {reasons[0]}"
+        else:
+            continue
+        remarks[i] = f"{remark}. {UNLISTED}"
     return remarks
 
 
 def _in_the_noise(hypothesis: Hypothesis, errors: Sequence[float]) -> bool:
-    """Whether it is a wave in time that is smaller than the rest of the noise on every joint.
+    """Whether a vibration is smaller than the rest of the noise on every joint.
 
     Mains hum and fans are in the signals of sensors, without a torque.
     """
-    if hypothesis.torque is None or hypothesis.kind != UNKNOWN:
-        return False
     waves = hypothesis.torque
-    return all(np.sqrt(np.mean(waves[:, j] ** 2)) < errors[j] for j in hypothesis.joints)
-
-
-def _wave_told(hypothesis: Hypothesis) -> str:
-    """Remark on a wave in the noise."""
-    waves = sorted({f"{c.term.shape['frequency']:.3g}" for c in hypothesis.candidates})
-    where = joints_told(j + 1 for j in hypothesis.joints)
-    return (
-        f"The torque of {where} contains a wave of {' and '.join(waves)} Hz that is smaller than "
-        "the noise, such as hum in a sensor. It is not counted as a finding."
-    )
+    assert waves is not None
+    return all(root_mean_square(waves[:, j]) < errors[j] for j in hypothesis.joints)
 
 
 def guess(diagnosis: Diagnosis) -> Withdrawal | None:

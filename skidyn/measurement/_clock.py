@@ -412,13 +412,15 @@ def _on_a_line(signals: Signals, values: Array) -> tuple[int, int, int]:
     digits lie beside a line by as much as these; a bend of any size is as frequent as a smaller one
     where the motion itself is smooth.
     """
-    exact = _straight(signals, values, 0.0, 1.0)
-    rounded, wider = (_straight(signals, values, FEW_DIGITS, times) for times in (1.0, CLEARLY))
-    return rounded if wider[1] < NOT_BENT * rounded[1] else exact
+    rounded = _straight(signals, values, FEW_DIGITS)
+    if rounded[1] <= ON_A_LINE * rounded[0]:
+        return rounded  # exactly on a line are even fewer
+    wider = _straight(signals, values, FEW_DIGITS, CLEARLY)
+    return rounded if wider[1] < NOT_BENT * rounded[1] else _straight(signals, values, 0.0)
 
 
 def _straight(
-    signals: Signals, values: Array, rounding: float, times: float
+    signals: Signals, values: Array, rounding: float, times: float = 1.0
 ) -> tuple[int, int, int]:
     """Changing rows, those on a line, and knots, for values of some relative rounding error.
 

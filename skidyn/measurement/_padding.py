@@ -14,19 +14,19 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._placeholder import placeholder_remedy
 from skidyn.measurement._suspicion import Suspicion
 
-#: Fewest rows of zeros at an end of a recording, and channels that are zero in them.
-FEWEST_ROWS, FEWEST_CHANNELS = 3, 3
+#: Fewest rows of zeros at an end of a recording.
+FEWEST_ROWS = 3
 
 
 class PaddedRows(Check):
-    """Rows at the ends of recordings in which every channel is zero."""
+    """Rows at the ends of recordings in which all positions and torques are zero."""
 
     name = "padded"
     suspects = "rows of zeros that were added at the ends of recordings"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         s = measurement.recorded
-        rows = padded_rows(np.hstack([s.q, s.dq, measurement.torque]), s.q, s.trajectory)
+        rows = padded_rows(s.q, measurement.torque, s.trajectory)
         if not rows.any():
             return
         recordings = np.unique(s.trajectory[rows])
@@ -35,31 +35,35 @@ class PaddedRows(Check):
         yield self.suspicion(
             "recordings were filled up with zeros at their ends",
             f"in {int(rows.sum())} rows, {100 * rows.mean():.2g} %, at the ends of "
-            f"{len(recordings)} recordings every position, velocity and torque is exactly zero, "
-            "and the positions before are not; the other checks leave these rows out",
+            f"{len(recordings)} recordings every position and torque is exactly zero, and the "
+            "positions before are not; the other checks leave these rows out",
             "certain",
             remedy=placeholder_remedy(0.0, [("q", k) for k in range(n)], n),
         )
 
 
 def padded_rows(
-    channels: Array, positions: Array, trajectory: NDArray[np.int64]
+    positions: Array, torque: Array, trajectory: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
     """Rows of zeros at the ends of recordings, to which positions jump, as a mask.
 
+    Velocities may have been derived from the positions, so that they jump at the first such row.
+
     Parameters
     ----------
-    channels : ndarray of shape (n_samples, n_channels)
-        All signals.
-    positions : ndarray of shape (n_samples, n_joints)
-        Positions among them.
+    positions : ndarray of shape (n_samples, n_joints), rad or m
+        Recorded positions.
+    torque : ndarray of shape (n_samples, n_joints), N m or N
+        Recorded torque.
     trajectory : ndarray of shape (n_samples,)
         Recording of every row.
+
+    Returns
+    -------
+    ndarray of shape (n_samples,) of bool
     """
-    found = np.zeros(len(channels), dtype=bool)
-    if channels.shape[1] < FEWEST_CHANNELS:
-        return found
-    zero: NDArray[np.bool_] = np.all(channels == 0, axis=1)
+    zero: NDArray[np.bool_] = np.all((positions == 0) & (torque == 0), axis=1)
+    found = np.zeros_like(zero)
     for name in np.unique(trajectory):
         rows = np.flatnonzero(trajectory == name)
         steps = np.abs(np.diff(positions[rows[~zero[rows]]], axis=0)).max(axis=0, initial=0.0)

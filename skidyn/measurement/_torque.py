@@ -200,8 +200,8 @@ def _magnitude_gain(fits: Fits, k: int) -> float:
     return best - plain if np.isfinite(best) else 0.0
 
 
-#: Least share of the residual torque that a correction must remove to be certain, and corrections
-#: like which a missing offset, spring or coupling looks.
+#: Least share of the residual torque that some corrections must remove to be certain: a missing
+#: offset, spring or coupling looks like them.
 MOSTLY, LIKE_EFFECTS = 0.8, ("zero", "no_gravity")
 
 

@@ -50,6 +50,7 @@ STATIC = (
     Term("coupling_spring", (1, 2), {"ratio": -1.0, "x0": 0.1, "bent": 1.0}),
     Term("nonlinear_spring", (1,), {"q_middle": 0.2}),
     ("gravity_compensator", [2]),
+    Term("gravity_compensator", (1,), {"aligned": 0.3, "lever": 0.4}),
     Term("end_stop", (2,), {"q_lim": 0.3, "side": 1.0}),
     Term("end_stop", (1,), {"q_lim": 0.3, "side": 1.0, "q_further": 0.8}),
     Term("saturation", (1,), {"limit": 0.5}),

@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skidyn.logs import read_log
+from skidyn.logs import check_log, read_log
 
 CHANNELS = [f"{name}{k}" for name in ("q", "dq", "tau") for k in (1, 2)]
 
@@ -40,6 +40,17 @@ def test_the_option_reads_them_as_missing(padded, arm, tmp_path):
     log = read_log(tmp_path / "log.csv", robot=arm, placeholder={"q": 0})
     assert (log[["q1", "q2"]] != 0).all(axis=None)
     assert len(frame) - count - 1 <= len(log) <= len(frame) - count  # one begins at zero
+
+
+def test_without_logged_velocities(padded, arm, tmp_path):
+    """Velocities are derived, so that they jump at the first row of zeros."""
+    frame, count = padded
+    frame.drop(columns=["dq1", "dq2", "ddq1", "ddq2"], errors="ignore").to_csv(
+        tmp_path / "log.csv", index=False
+    )
+    told = check_log(read_log(tmp_path / "log.csv", robot=arm, check=False), arm).checks
+    assert [s.check for s in told if s.certainty != "noted"] == ["padded"]
+    assert f"in {count} rows" in told[0].evidence
 
 
 def test_a_log_that_begins_at_zero_is_not_padded(short, told_of):
