@@ -14,6 +14,7 @@ from skidyn.effects._base import Effect
 from skidyn.effects._derivatives import smooth_derivatives
 from skidyn.effects._nameless import NamelessEffect
 from skidyn.effects._parameters import Coefficient, Shape
+from skidyn.effects._soft_gap import LoadOfLink
 
 
 def _swing(
@@ -111,6 +112,8 @@ def _oscillation(
 _FAST, _FEWEST = 4.0, 20
 #: Step of the difference quotients; about their relative error, with a thousandth due to rounding.
 _STEP = 1e-6
+#: What the torque of a joint depends on.
+MOTION = ("position", "velocity", "acceleration")
 
 
 def _shared(signals: Signals, joint: int, name: str, make: Callable[[], Array]) -> Array:
@@ -206,7 +209,7 @@ class _LinkSideEffect(Effect):
     ) -> dict[int, Array]:
         (joint,) = joints
         moves = self.moves(signals, joint, **shape)
-        slopes = [_slope(signals, joint, by) for by in ("position", "velocity", "acceleration")]
+        slopes = [_slope(signals, joint, by) for by in MOTION]
         change = np.zeros((signals.n_joints, signals.n_samples))
         product = np.empty_like(change)
         for slope, move in zip(slopes, moves, strict=True):
@@ -311,7 +314,12 @@ class JointElasticity(_LinkSideEffect):
 
 
 class Backlash(_LinkSideEffect):
-    """Play between motor and link: the link crosses the gap when its load changes sign."""
+    """Play between motor and link: the link crosses the gap when its load changes sign.
+
+    In the plain form the link flies from one hard flank to the other. With a ``torque`` in its
+    shape the flanks give way, and the link is where the load presses it,
+    ``x = tanh(load / torque) / 2`` of the gap.
+    """
 
     kind = "backlash"
     title = "Backlash"
@@ -319,14 +327,40 @@ class Backlash(_LinkSideEffect):
     formula = r"\tau(q - g\,x) - \tau(q),\quad m\,\ddot x = \tau_\mathrm{load}/g,\ |x| \le 1/2"
     coefficients = (Coefficient("share", "1", sign=1, is_share=True),)
     # The time of a crossing, and with it the whole column, changes with the root of the gap.
-    shapes = (Shape("gap", "rad", (0.002, 0.003, 0.0045, 0.006, 0.009, 0.013, 0.02), 2e-4, 0.2),)
+    shapes = (
+        Shape("gap", "rad", (0.002, 0.003, 0.0045, 0.006, 0.009, 0.013, 0.02), 2e-4, 0.2),
+        Shape("torque", "N m", (), 1e-12, np.inf, scales=False),
+    )
+    #: As a share of the root mean square of the load.
+    forms = ({"torque": 0.2},)
     simplicity = 18
     rivals = ("joint_elasticity", "dahl")
     separating_motion = "slow motion through poses in which the load changes sign"
     reference = "Nordin, Gutman (2002), Automatica 38(10), 1633-1649."
 
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        assert signals.load is not None
+        load, unit = signals.load[:, joints[0]], float(signals.unit[joints[0]])
+        usual = float(np.sqrt(np.mean(load**2)))
+        (form,) = self.forms
+        shapes: list[dict[str, Any]] = [{"gap": gap * unit} for gap in self.shapes[0].grid]
+        soft = [{"gap": gap * unit, "torque": form["torque"] * usual} for gap in SOFT_GAPS]
+        return shapes + [s for s in soft if self.admissible(signals, joints, s)]
+
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        if "torque" not in shape:
+            return True
+        # A gap that the load does not close on both sides is an elastic gear.
+        assert signals.load is not None
+        low, high = np.quantile(signals.load[:, joints[0]], (CLOSED, 1 - CLOSED)).tolist()
+        return bool(0 < shape["torque"] < min(-low, high))
+
     def moves(self, signals: Signals, joint: int, **shape: Any) -> tuple[Array, Array, Array]:
         assert signals.load is not None
+        if "torque" in shape:
+            slopes = [_slope(signals, joint, by)[joint] for by in MOTION]
+            load = LoadOfLink(signals, joint, slopes, shape["gap"], shape["torque"])
+            return smooth_derivatives(load.position(load.found()), signals)
         free = signals.load[:, joint] / _link_inertia(signals, joint)
         position: Array = np.zeros_like(free)
         for rows, step in zip(signals.segments, signals.steps, strict=True):
@@ -346,7 +380,15 @@ class Backlash(_LinkSideEffect):
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
-        return {"gap": float(coefficients[0]) * shape["gap"]}
+        torque = {"torque": shape["torque"]} if "torque" in shape else {}
+        return {"gap": float(coefficients[0]) * shape["gap"], **torque}
+
+
+#: Gaps with soft flanks with which the search starts, rad: the column of another gap has nearly the
+#: same form.
+SOFT_GAPS = (0.0015, 0.008, 0.04)
+#: Share of the samples in which the load closes a gap on each side, at least.
+CLOSED = 0.02
 
 
 def _flight(acceleration: Array, step: float, half: float, chunk: int = 64) -> Array:
