@@ -9,7 +9,7 @@ results.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dpotrs
+import scipy  # its parts are imported when first used, after the first output of a check
 
 from skidyn._signals import Array
 
@@ -27,7 +27,7 @@ def factored(normal: Array) -> Array:
     LinAlgError
         The matrix is not positive definite.
     """
-    factor, info = dpotrf(normal, lower=0, clean=0, overwrite_a=1)
+    factor, info = scipy.linalg.lapack.dpotrf(normal, lower=0, clean=0, overwrite_a=1)
     if info:
         raise np.linalg.LinAlgError(f"leading minor {info} is not positive definite")
     return np.asarray(factor)
@@ -37,4 +37,4 @@ def solved(factor: Array, right: Array) -> Array:
     """Solution for a factor of :func:`factored` and right sides of shape (p,) or (p, k)."""
     if not len(factor):  # a model without coefficients
         return np.zeros(right.shape)
-    return np.asarray(dpotrs(factor, right, lower=0)[0])
+    return np.asarray(scipy.linalg.lapack.dpotrs(factor, right, lower=0)[0])

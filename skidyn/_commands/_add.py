@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from skidyn._commands._arguments import JsonFile, command, with_joints, with_report
 from skidyn._commands._controllers import controller_told, driven_with
+from skidyn._commands._earlier import earlier_checks
 from skidyn._commands._input import (
     joint_numbers,
     read_driven,
@@ -106,7 +107,8 @@ def run(options: argparse.Namespace) -> None:
     if controller is not None:  # other effects are judged by the torque with all settings
         others = [s for s in known if s not in added]
         controller, tau = driven_with(controller, tau, others, frame, robot.n_joints)
-    given = run_diagnosis(model, frame, tau, options, kinds=())
+    checks = earlier_checks(options)
+    given = run_diagnosis(model, frame, tau, options, kinds=(), checks=checks)
     stated = None
     if controller is not None and added:
         controller, tau = driven_with(controller, tau, added, frame, robot.n_joints)

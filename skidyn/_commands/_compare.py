@@ -6,9 +6,10 @@ from __future__ import annotations
 import argparse
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from skidyn._commands._arguments import Input, Page, TestReport, Traces, command, with_log
+from skidyn._commands._earlier import earlier_checks, earlier_diagnosis
 from skidyn._commands._gate import gate
 from skidyn._commands._input import read_model_and_log, read_robot, recorded_options
 from skidyn._commands._output import (
@@ -21,9 +22,6 @@ from skidyn._commands._output import (
 from skidyn._exceptions import SkidynError
 from skidyn._text import digits
 from skidyn._writing import writable
-
-if TYPE_CHECKING:
-    from skidyn.diagnosis import Diagnosis
 
 DESCRIPTION = """\
 Compare a model with a log: print the error on motion that was left out of the fit, by joint and
@@ -133,7 +131,8 @@ def _compare_with_log(options: argparse.Namespace) -> None:
             "The page of one model and one log is made by skidyn diagnose --html"
         )
     model, frame, tau = read_model_and_log(options, check=False)  # a diagnosis checks it
-    diagnosis = run_diagnosis(model, frame, tau, options, kinds=())
+    checks = earlier_checks(options)
+    diagnosis = run_diagnosis(model, frame, tau, options, kinds=(), checks=checks)
     comparison = diagnosis.comparison
     if options.traces:
         from skidyn.export import write_traces
@@ -185,16 +184,19 @@ def _names(options: argparse.Namespace, pair: list[argparse.Namespace]) -> list[
     return names if names[0] != names[1] else ["first", "second"]
 
 
-def _diagnosed(one: argparse.Namespace, other: argparse.Namespace) -> list[Diagnosis]:
-    """Diagnoses of both sides; common parts are computed once."""
-    found: list[Diagnosis] = []
+def _diagnosed(one: argparse.Namespace, other: argparse.Namespace) -> list[Any]:
+    """Diagnoses of both sides, stored ones if possible; common parts are computed once."""
+    found: list[Any] = []
     for side in (one, other):
         same_log = bool(found) and _but_for(side, "model") == _but_for(one, "model")
         if same_log and side.model == one.model:
             return [*found, *found]
         model, frame, tau = read_model_and_log(side, check=False)  # a diagnosis checks it
-        checks = found[0].checks if same_log else None
-        found.append(run_diagnosis(model, frame, tau, side, checks=checks))
+        diagnosis: Any = earlier_diagnosis(side, model, frame, tau)
+        if diagnosis is None:
+            checks = getattr(found[0], "checks", None) if same_log else None
+            diagnosis = run_diagnosis(model, frame, tau, side, checks=checks)
+        found.append(diagnosis)
     return found
 
 

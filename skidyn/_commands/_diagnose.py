@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skidyn._commands._arguments import JsonFile, Page, command, with_controller, with_log
+from skidyn._commands._earlier import stored
 from skidyn._commands._input import read_driven
 from skidyn._commands._kept import Kept, noting
 from skidyn._commands._output import (
@@ -111,12 +112,14 @@ def run(options: argparse.Namespace) -> None:
 
 def _answer(options: argparse.Namespace) -> dict[str, Any]:
     """The results, as values that can be stored."""
+    of_the_log = options.controller is None
     with noting() as noted:
         try:
             diagnosis, frame = _diagnosed(options)
         except MisreadLogError as error:
             if options.clock != "auto" or {s.check for s in error.suspicions} != {"clock_jitter"}:
                 raise
+            of_the_log = False
             options = argparse.Namespace(**vars(options) | {"clock": "regular"})
             diagnosis, frame = _diagnosed(options)
             mended = [_mended(jitter) for jitter in error.suspicions]
@@ -142,6 +145,8 @@ def _answer(options: argparse.Namespace) -> dict[str, Any]:
         "told": list(diagnosis.warnings),
         "noted": noted,
         "changed": frame.attrs["notes"],
+        "of_the_log": of_the_log,
+        "compared": stored(diagnosis) if of_the_log else None,
         "clock": options.clock,
     }
 

@@ -23,7 +23,6 @@ from skidyn.diagnosis._faded import FadingCorrection, step_scores
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._rule import Settings
 from skidyn.effects import Term
-from skidyn.model_selection import held_out_folds
 
 #: Largest p-value of a gain over the folds.
 LEVEL = 0.05
@@ -231,6 +230,8 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         from sklearn.metrics import check_scoring
         from sklearn.model_selection import check_cv
         from sklearn.utils.parallel import Parallel, delayed
+
+        from skidyn.model_selection import held_out_folds
 
         history, findings = self.diagnosis_.history, self.diagnosis_.findings
         # One model per step, with the effects found up to it; effects added in several steps at

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.exceptions import FitFailedWarning
-from sklearn.pipeline import Pipeline
 from sklearn.utils import _safe_indexing
 
 from skidyn._signals import Array
@@ -97,18 +96,27 @@ class FadingCorrection(RegressorMixin, BaseEstimator):
 
 
 def _knows_its_std(model: Any) -> bool:
-    while isinstance(model, Pipeline):
-        model = model[-1]
-    return isinstance(model, RBDRegressor)
+    return isinstance(_opened(model)[0], RBDRegressor)
 
 
 def _with_std(model: Any, X: Any) -> tuple[Array, Array]:
     """Prediction and standard deviation; a Pipeline would need requests for routed metadata."""
-    while isinstance(model, Pipeline):
-        X = model[:-1].transform(X) if len(model) > 1 else X
-        model = model[-1]
+    model, before = _opened(model)
+    for steps in before:
+        X = steps.transform(X)
     torque, std = model.predict(X, return_std=True)
     return torque, std
+
+
+def _opened(model: Any) -> tuple[Any, list[Any]]:
+    """The last step of nested Pipelines, and the steps before it, the outermost first."""
+    from sklearn.pipeline import Pipeline  # its import takes 0.1 s
+
+    before = []
+    while isinstance(model, Pipeline):
+        before += [model[:-1]] if len(model) > 1 else []
+        model = model[-1]
+    return model, before
 
 
 def step_scores(

@@ -16,8 +16,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import lstsq
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
@@ -290,7 +290,7 @@ class Evidence:
         size = np.linalg.norm(a, axis=0)
         size[size == 0] = 1.0
         coefficients = np.zeros(len(self.columns))
-        coefficients[index] = lstsq(a / size, y, cond=RANK_TOLERANCE)[0] / size
+        coefficients[index] = scipy.linalg.lstsq(a / size, y, cond=RANK_TOLERANCE)[0] / size
         return coefficients
 
     def squared_error(self, coefficients: Array) -> dict[Key, float]:

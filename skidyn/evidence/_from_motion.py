@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals, blocks_held_out
@@ -353,7 +353,7 @@ def _qr(rows: Array) -> Array:
     width = rows.shape[1]
     if len(rows) < width:
         rows = np.vstack([rows, np.zeros((width - len(rows), width))])
-    packed, _, _, info = lapack.dgeqrf(rows)
+    packed, _, _, info = scipy.linalg.lapack.dgeqrf(rows)
     assert info == 0
     return np.triu(packed[:width])
 
@@ -362,7 +362,7 @@ def _root(gram: Array) -> Array:
     """Triangular factor of a Gram matrix, which may be singular."""
     size = np.sqrt(np.diag(gram))
     size[size == 0] = 1.0
-    packed, pivots, rank, _ = lapack.dpstrf(gram / size[:, None] / size)
+    packed, pivots, rank, _ = scipy.linalg.lapack.dpstrf(gram / size[:, None] / size)
     factor = np.triu(packed)
     factor[rank:] = 0.0  # what dpstrf leaves there is not part of the factor
     ordered = np.empty_like(factor)

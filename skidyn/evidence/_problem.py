@@ -6,11 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 from skidyn._cores import each
 from skidyn._last import LastResults
@@ -23,6 +22,9 @@ from skidyn.evidence._motion_rows import RowsAndFolds, read_motion, rows_and_fol
 from skidyn.evidence._rigid_rows import independent_columns, regressor_rows
 from skidyn.evidence._rows import WINDOW, Rows, averaged, interpolation
 from skidyn.robots import Robot, base_parameter_index
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 #: Samples per window that are enough for a smooth function; at first, others are omitted.
 ENOUGH_SAMPLES = 16

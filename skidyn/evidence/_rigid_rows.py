@@ -6,8 +6,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import qr
 
 from skidyn._progress import tell
 from skidyn._signals import Array
@@ -49,7 +49,7 @@ def independent_columns(rows: Array) -> NDArray[np.int64]:
     scaled = np.empty((len(rows), len(moved)), order="F")  # in the order of LAPACK: no copy
     for k, column in enumerate(moved):
         np.divide(rows[:, column], size[column], out=scaled[:, k])
-    triangle, pivots = qr(scaled, overwrite_a=True, mode="r", pivoting=True)
+    triangle, pivots = scipy.linalg.qr(scaled, overwrite_a=True, mode="r", pivoting=True)
     diagonal = np.abs(np.diag(triangle))
     rank = int(np.sum(diagonal > RANK_TOLERANCE * diagonal[0]))
     return np.sort(moved[pivots[:rank]])

@@ -13,13 +13,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 from skidyn._signals import Array, Signals
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 #: Width of a window in s; wider if the log is slow, to hold a few samples.
 WINDOW = 1 / 8
@@ -146,7 +149,7 @@ class Rows:
         -------
         list of csr_matrix of shape (n_rows_j, n)
         """
-        return [csr_matrix(w @ between).sorted_indices() for w in self.weights]
+        return [scipy.sparse.csr_matrix(w @ between).sorted_indices() for w in self.weights]
 
     def weighted(self, weight: Array) -> Rows:
         """The same rows, each multiplied by the root of the mean weight of its samples.
@@ -217,7 +220,7 @@ class RowsInTime:
 def _scaled(weights: csr_matrix, factor: Array) -> csr_matrix:
     """Weights whose rows are multiplied by a factor each."""
     data = weights.data * np.repeat(factor, np.diff(weights.indptr))
-    return csr_matrix((data, weights.indices, weights.indptr), shape=weights.shape)
+    return scipy.sparse.csr_matrix((data, weights.indices, weights.indptr), shape=weights.shape)
 
 
 def averaged(weights: csr_matrix, values: Array) -> Array:
@@ -238,7 +241,7 @@ def every_sample(signals: Signals) -> Rows:
     n, joints = signals.n_samples, range(signals.n_joints)
     order = np.arange(n)
     return Rows(
-        [csr_matrix((np.ones(n), (order, order)), shape=(n, n)) for _ in joints],
+        [scipy.sparse.csr_matrix((np.ones(n), (order, order)), shape=(n, n)) for _ in joints],
         [signals.trajectory.astype(np.int64) for _ in joints],
         [order.astype(float) for _ in joints],
         [order * 8 // max(1, n) % 4 for _ in joints],
@@ -343,7 +346,7 @@ def interpolation(segments: Sequence[slice], few: Sequence[slice], step: int) ->
     starts = np.concatenate([[0], np.cumsum(counts)])
     found = np.concatenate([np.zeros(0), *values]), np.concatenate([np.zeros(0, int), *columns])
     n = few[-1].stop if few else 0
-    return csr_matrix((*found, starts), shape=(n_samples, n))
+    return scipy.sparse.csr_matrix((*found, starts), shape=(n_samples, n))
 
 
 def widened(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
@@ -438,4 +441,4 @@ def _stack(parts: list[Entries], n_samples: int) -> csr_matrix:
     start = np.cumsum(np.concatenate([[0], *lengths]))
     sample = np.concatenate([part[1] for part in parts])
     value = np.concatenate([part[2] for part in parts])
-    return csr_matrix((value, sample, start), shape=(len(start) - 1, n_samples))
+    return scipy.sparse.csr_matrix((value, sample, start), shape=(len(start) - 1, n_samples))

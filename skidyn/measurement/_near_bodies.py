@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array
 from skidyn.measurement._fits import Fits, friction
@@ -234,11 +234,11 @@ class Factored:
         self.scale = 1 / np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
         even = gram * self.scale * self.scale[:, None]
         even[np.diag_indices(len(even))] += ROUNDING
-        self.factor = cho_factor(even)
+        self.factor = scipy.linalg.cho_factor(even)
 
     def solve(self, right: Array) -> Array:
         scale = self.scale if right.ndim == 1 else self.scale[:, None]
-        return np.asarray(scale * cho_solve(self.factor, scale * right))
+        return np.asarray(scale * scipy.linalg.cho_solve(self.factor, scale * right))
 
 
 def solved(gram: Array, right: Array, positive: Sequence[int]) -> Array:

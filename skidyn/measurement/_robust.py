@@ -16,8 +16,8 @@ from itertools import product
 from math import lgamma
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from skidyn._signals import Array, scatter
 
@@ -170,7 +170,8 @@ def fit_together(
         diagonal[diagonal == 0] = 1.0
         # relative: an absolute one would outweigh the torques of a heavy robot
         gram = gram / diagonal[:, None] / diagonal + 1e-10 * np.eye(len(size))
-        coefficients = cho_solve(cho_factor(gram), cross / diagonal) / diagonal
+        factor = scipy.linalg.cho_factor(gram)
+        coefficients = scipy.linalg.cho_solve(factor, cross / diagonal) / diagonal
         residuals = [
             y - coefficients[place] @ d for d, place, y in zip(scaled, places, targets, strict=True)
         ]

@@ -16,7 +16,6 @@ from skidyn._exceptions import SkidynError
 from skidyn._keys import keys_of
 from skidyn.forward import Controller
 from skidyn.identification import RBDRegressor
-from skidyn.model_selection import held_out_folds
 from skidyn.simulation._score import (
     HORIZON,
     SimulationErrors,
@@ -195,6 +194,8 @@ def judge_in_turn(
 
 def _folds(model: RBDRegressor, X: Any) -> list[tuple[Rows, Rows]]:
     """Rows to fit and rows to simulate: recording by recording, or pieces of a single one."""
+    from skidyn.model_selection import held_out_folds  # its import takes 0.2 s
+
     names = names_of_table(X)
     column = keys_of(X, trajectory=model.trajectory, time=model.time).trajectory
     number = np.zeros(len(X)) if column is None else np.asarray(X[names[column]])
