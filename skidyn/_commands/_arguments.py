@@ -243,11 +243,6 @@ def with_report(parser: Any) -> None:
     parser.add_argument(
         "--from", dest="report", type=Input, required=True, help="report.json of diagnose"
     )
-    with_other_robot(parser)
-
-
-def with_other_robot(parser: Any) -> None:
-    """The robot in place of that of a report."""
     parser.add_argument(
         "--urdf",
         type=Input,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from skidyn._commands._arguments import Input, Page, TestReport, Traces, command, with_log
 from skidyn._commands._gate import gate
-from skidyn._commands._input import read_model_and_log, read_robot, recorded_options
+from skidyn._commands._input import read_inputs, recorded_options
 from skidyn._commands._output import (
     print_comparison,
     print_json,
@@ -93,15 +93,10 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> bool | None:
     if options.fail_above is not None or options.junit:
         return gate(options)
-    _compare(options)
-    return None
-
-
-def _compare(options: argparse.Namespace) -> None:
     pair = _pair(options)
     if pair is None:
         _compare_with_log(options)
-        return
+        return None
     if options.traces:
         raise SkidynError(
             "--traces writes one model on one log: leave out --against and --against-model"
@@ -120,10 +115,11 @@ def _compare(options: argparse.Namespace) -> None:
         files = [write_html(options.html, summary), write_json(numbers, summary["report"])]
     if options.json:
         print_json(summary["report"])
-        return
+        return None
     _print_pair(summary)
     for path in files:
         print(f"written: {path.resolve()}")
+    return None
 
 
 def _compare_with_log(options: argparse.Namespace) -> None:
@@ -132,7 +128,8 @@ def _compare_with_log(options: argparse.Namespace) -> None:
             "--html and --names compare two: add --against, --against-model, or give two reports. "
             "The page of one model and one log is made by skidyn diagnose --html"
         )
-    model, frame, tau = read_model_and_log(options, check=False)  # a diagnosis checks it
+    # a diagnosis checks the log
+    robot, model, frame, tau, _ = read_inputs(options, check=False)
     diagnosis = run_diagnosis(model, frame, tau, options, kinds=())
     comparison = diagnosis.comparison
     if options.traces:
@@ -141,7 +138,7 @@ def _compare_with_log(options: argparse.Namespace) -> None:
         if len(comparison.measured) < len(frame):  # recordings that occur twice count once
             frame = frame[frame["trajectory"].isin(comparison.signals.trajectory)]
         torques = comparison.measured, comparison.predicted
-        write_traces(options.traces, frame, *torques, read_robot(options))
+        write_traces(options.traces, frame, *torques, robot)
     if options.json:
         print_json(
             {"table": comparison.table(), "failures": [asdict(f) for f in diagnosis.failures]}
@@ -192,7 +189,7 @@ def _diagnosed(one: argparse.Namespace, other: argparse.Namespace) -> list[Diagn
         same_log = bool(found) and _but_for(side, "model") == _but_for(one, "model")
         if same_log and side.model == one.model:
             return [*found, *found]
-        model, frame, tau = read_model_and_log(side, check=False)  # a diagnosis checks it
+        _, model, frame, tau, _ = read_inputs(side, check=False)
         checks = found[0].checks if same_log else None
         found.append(run_diagnosis(model, frame, tau, side, checks=checks))
     return found

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skidyn._commands._arguments import JsonFile, Page, command, with_controller, with_log
-from skidyn._commands._input import read_driven
+from skidyn._commands._input import read_inputs
 from skidyn._commands._kept import Kept, noting
 from skidyn._commands._output import (
     explain_motion,
@@ -148,7 +148,7 @@ def _answer(options: argparse.Namespace) -> dict[str, Any]:
 
 def _diagnosed(options: argparse.Namespace) -> tuple[Diagnosis, pd.DataFrame]:
     """The diagnosis of the log read with the options, and the log."""
-    model, frame, tau, controller = read_driven(options, check=False)
+    _, model, frame, tau, controller = read_inputs(options, check=False)
     diagnosis = run_diagnosis(model, frame, tau, options, controller=controller)
     return diagnosis, frame
 
