@@ -17,15 +17,8 @@ from skidyn._signals import Array
 def factored(normal: Array) -> Array:
     """Upper triangular factor of a symmetric positive definite matrix; its lower part is arbitrary.
 
-    Parameters
-    ----------
-    normal : ndarray of shape (p, p)
-        The matrix; overwritten if its columns are contiguous.
-
-    Raises
-    ------
-    LinAlgError
-        The matrix is not positive definite.
+    The matrix is overwritten if its columns are contiguous; a LinAlgError is raised if it is not
+    positive definite.
     """
     factor, info = scipy.linalg.lapack.dpotrf(normal, lower=0, clean=0, overwrite_a=1)
     if info:

@@ -82,7 +82,9 @@ def resolve_columns(
     """
     if names is not None:
         names = [str(name) for name in names]
-        _refuse_duplicates(names)
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            listed = ", ".join(twice)
+            raise ColumnError(f"X has the column(s) {listed} more than once; keep one each.")
     key_trajectory, key_time = key_columns(names, n_features, trajectory, time)
     if names is not None and _looks_named(names):
         q, dq = (_by_name(names, prefix, joint_names, True) for prefix in ("q", "dq"))
@@ -109,12 +111,6 @@ def resolve_columns(
 def _looks_named(names: Sequence[str]) -> bool:
     """Whether the names follow the contract (a DataFrame with the columns 0, 1, .. does not)."""
     return any(name == "q1" or name.startswith(("q_", "dq_")) for name in names)
-
-
-def _refuse_duplicates(names: Sequence[str]) -> None:
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise ColumnError(f"X has the column(s) {', '.join(twice)} more than once; keep one each.")
 
 
 def key_columns(

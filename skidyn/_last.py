@@ -25,16 +25,8 @@ class LastResults:
     ) -> Any:
         """Result of ``make``, computed again only if it is asked for with other objects.
 
-        Parameters
-        ----------
-        name : str
-            What it is; only the last result of a name is kept.
-        made_of : sequence
-            All arrays on which it depends, the same objects if it has not changed.
-        make : callable
-            Function that returns the result, which must not be changed.
-        equal : sequence, default=()
-            Further objects on which it depends, which may be other ones with the same value.
+        Only the last result of a name is kept; it must not be changed. It depends on the arrays
+        ``made_of``, the same objects if unchanged, and on what is ``equal`` in value.
         """
         if name in self._kept:
             kept, values, found = self._kept[name]

@@ -50,18 +50,10 @@ _QUANTITY_OF = {word: quantity for quantity, words in SPELLINGS.items() for word
 
 @dataclass
 class NameMatch:
-    """Assignment of source columns to signals.
+    """Assignment of source columns to signals, by their names in the log (``q1``).
 
-    Attributes
-    ----------
-    columns : dict of str to str
-        Name in the log (``q1``) to name in the source.
-    joint_names : list of str
-        Joints in column order.
-    notes : list of str
-        Decisions to be reported.
-    units : dict of str to (str, str)
-        Column of the source and the unit in its header, per name in the log.
+    ``joint_names`` are in column order, ``notes`` are decisions to be reported, and ``units`` the
+    columns of the source with the unit in their header.
     """
 
     columns: dict[str, str] = field(default_factory=dict)
@@ -106,8 +98,10 @@ def match_names(
         if indexed:
             indexed.refuse_choice(quantity, source)
             by_name = _with_joints(indexed, listed or {}, robot_joints, match.notes)
-            if by_name is None:
-                _place_by_index(match, quantity, indexed)
+            if by_name is None:  # numbered from 1; a logger that counts from 0 has a 0
+                shift = 1 if 0 in indexed else 0
+                for index, name in sorted(indexed.items()):
+                    match.columns[f"{quantity}{index + shift}"] = name
             else:
                 _place_by_joint(match, quantity, by_name, robot_joints, source)
         elif named and (robot_joints is not None or "q" not in by_index):
@@ -331,13 +325,6 @@ def is_signal(name: str) -> bool:
 
 def _plain(text: str) -> str:
     return re.sub(r"[^a-z0-9]", "", text.lower())
-
-
-def _place_by_index(match: NameMatch, quantity: str, found: Mapping[int, str]) -> None:
-    """Number columns from 1; a logger that counts from 0 is recognised by its 0."""
-    shift = 1 if 0 in found else 0
-    for index, name in sorted(found.items()):
-        match.columns[f"{quantity}{index + shift}"] = name
 
 
 def _leave_incomplete(match: NameMatch, quantity: str, n: int, source: str) -> None:

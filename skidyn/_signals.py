@@ -80,20 +80,9 @@ def runs_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]
 
 
 def rates_of(values: Array, time: Array, segments: Iterable[slice]) -> Array:
-    """Time derivative of channels by central differences; zero in segments of a single row.
+    """Rates per s of channels (n_samples, n_channels) by central differences, segment by segment.
 
-    Parameters
-    ----------
-    values : ndarray of shape (n_samples, n_channels)
-        Channels.
-    time : ndarray of shape (n_samples,), s
-        Increasing in every segment.
-    segments : iterable of slice
-        Contiguous runs of rows.
-
-    Returns
-    -------
-    ndarray of shape (n_samples, n_channels), per s
+    Time, in s, increases in every segment; the rate is zero in segments of a single row.
     """
     rates = np.zeros(values.shape)
     for rows in segments:

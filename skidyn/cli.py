@@ -78,7 +78,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 sys.stdout.flush()  # here, where a full disk is still reported
             finally:  # warnings often explain why a log was refused
                 told = getattr(options, "told", ())  # reported by the command itself
-                for text in dict.fromkeys(str(w.message) for w in caught if _is_ours(w)):
+                ours = (w for w in caught if issubclass(w.category, LogWarning))
+                for text in dict.fromkeys(str(w.message) for w in ours):
                     if text not in told:
                         _complain(f"warning: {text}")
     except BrokenPipeError:  # the reader, such as head, has closed the pipe
@@ -201,10 +202,6 @@ def _complain(text: str) -> None:
 
         text = "\n".join(fit(line, get_terminal_size().columns) for line in text.split("\n"))
     print(text, file=sys.stderr)
-
-
-def _is_ours(caught: warnings.WarningMessage) -> bool:
-    return issubclass(caught.category, LogWarning)
 
 
 if __name__ == "__main__":

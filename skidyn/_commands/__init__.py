@@ -1,41 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The commands of the command line: one module each, with ``add_parser`` and ``run``."""
 
-from skidyn._commands import (
-    _add,
-    _check,
-    _compare,
-    _completion,
-    _demo,
-    _diagnose,
-    _effects,
-    _excite,
-    _explore,
-    _export,
-    _identify,
-    _payload,
-    _report,
-    _separate,
-    _simulate,
-)
+from importlib import import_module
 
 #: In the order in which ``skidyn --help`` lists them: that of the loop.
-COMMANDS = (
-    _demo,
-    _check,
-    _compare,
-    _diagnose,
-    _explore,
-    _add,
-    _separate,
-    _identify,
-    _payload,
-    _report,
-    _excite,
-    _export,
-    _simulate,
-    _effects,
-    _completion,
-)
+_NAMES = """
+demo check compare diagnose explore add separate identify payload report excite export simulate
+effects completion
+"""
+
+COMMANDS = tuple(import_module(f"skidyn._commands._{name}") for name in _NAMES.split())
 
 __all__ = ["COMMANDS"]

@@ -14,9 +14,8 @@ from skidyn._commands._controllers import controller_told, driven_with
 from skidyn._commands._earlier import earlier_checks
 from skidyn._commands._input import (
     joint_numbers,
-    read_driven,
     read_effects,
-    read_robot,
+    read_inputs,
     recorded_options,
     settings_of,
 )
@@ -94,8 +93,8 @@ def run(options: argparse.Namespace) -> None:
 
     kind, joints = options.effect, joint_numbers(options.on)
     options = recorded_options(options)
-    model, frame, tau, controller = read_driven(options, check=False)  # a diagnosis checks it
-    robot = read_robot(options)
+    # a diagnosis checks the log
+    robot, model, frame, tau, controller = read_inputs(options, check=False)
     setting = get_effect(kind).of_servo
     known = [] if controller is None or "tau1" in frame else settings_of(options.report)
     added = [s for s in known if setting and s.is_of(kind, joints)]

@@ -14,8 +14,6 @@ from skidyn._writing import keep, writable
 class Input(str):
     """A file that a command reads, and never writes."""
 
-    __slots__ = ()
-
 
 class Output(str):
     """A file that a command writes; its ending determines its kind.
@@ -24,7 +22,6 @@ class Output(str):
     result.
     """
 
-    __slots__ = ()
     endings: tuple[str, ...] = ()
 
     def __new__(cls, name: str) -> Output:
@@ -35,39 +32,17 @@ class Output(str):
         return super().__new__(cls, name)
 
 
-class JsonFile(Output):
-    """Result as JSON."""
+def _ending(*allowed: str) -> type[Output]:
+    class File(Output):
+        endings = allowed
 
-    __slots__ = ()
-    endings = (".json",)
-
-
-class Page(Output):
-    """Result as a page."""
-
-    __slots__ = ()
-    endings = (".html", ".htm")
+    return File
 
 
-class Motion(Output):
-    """Motion as a table."""
-
-    __slots__ = ()
-    endings = (".csv",)
-
-
-class Traces(Output):
-    """Signals for a log viewer."""
-
-    __slots__ = ()
-    endings = (".mcap", ".rrd")
-
-
-class TestReport(Output):
-    """Result for tools that collect tests."""
-
-    __slots__ = ()
-    endings = (".xml",)
+#: Results as JSON or as a page, and a motion as a table.
+JsonFile, Page, Motion = _ending(".json"), _ending(".html", ".htm"), _ending(".csv")
+#: Signals for a log viewer, and a result for tools that collect tests.
+Traces, TestReport = _ending(".mcap", ".rrd"), _ending(".xml")
 
 
 def check_files(options: argparse.Namespace) -> None:
@@ -268,11 +243,6 @@ def with_report(parser: Any) -> None:
     parser.add_argument(
         "--from", dest="report", type=Input, required=True, help="report.json of diagnose"
     )
-    with_other_robot(parser)
-
-
-def with_other_robot(parser: Any) -> None:
-    """The robot in place of that of a report."""
     parser.add_argument(
         "--urdf",
         type=Input,

@@ -11,7 +11,7 @@ from typing import Any
 from skidyn._commands._arguments import Input, Page, TestReport, Traces, command, with_log
 from skidyn._commands._earlier import earlier_checks, earlier_diagnosis
 from skidyn._commands._gate import gate
-from skidyn._commands._input import read_model_and_log, read_robot, recorded_options
+from skidyn._commands._input import read_inputs, recorded_options
 from skidyn._commands._output import (
     print_comparison,
     print_json,
@@ -91,15 +91,10 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> bool | None:
     if options.fail_above is not None or options.junit:
         return gate(options)
-    _compare(options)
-    return None
-
-
-def _compare(options: argparse.Namespace) -> None:
     pair = _pair(options)
     if pair is None:
         _compare_with_log(options)
-        return
+        return None
     if options.traces:
         raise SkidynError(
             "--traces writes one model on one log: leave out --against and --against-model"
@@ -118,10 +113,11 @@ def _compare(options: argparse.Namespace) -> None:
         files = [write_html(options.html, summary), write_json(numbers, summary["report"])]
     if options.json:
         print_json(summary["report"])
-        return
+        return None
     _print_pair(summary)
     for path in files:
         print(f"written: {path.resolve()}")
+    return None
 
 
 def _compare_with_log(options: argparse.Namespace) -> None:
@@ -130,7 +126,8 @@ def _compare_with_log(options: argparse.Namespace) -> None:
             "--html and --names compare two: add --against, --against-model, or give two reports. "
             "The page of one model and one log is made by skidyn diagnose --html"
         )
-    model, frame, tau = read_model_and_log(options, check=False)  # a diagnosis checks it
+    # a diagnosis checks the log
+    robot, model, frame, tau, _ = read_inputs(options, check=False)
     checks = earlier_checks(options)
     diagnosis = run_diagnosis(model, frame, tau, options, kinds=(), checks=checks)
     comparison = diagnosis.comparison
@@ -140,7 +137,7 @@ def _compare_with_log(options: argparse.Namespace) -> None:
         if len(comparison.measured) < len(frame):  # recordings that occur twice count once
             frame = frame[frame["trajectory"].isin(comparison.signals.trajectory)]
         torques = comparison.measured, comparison.predicted
-        write_traces(options.traces, frame, *torques, read_robot(options))
+        write_traces(options.traces, frame, *torques, robot)
     if options.json:
         print_json(
             {"table": comparison.table(), "failures": [asdict(f) for f in diagnosis.failures]}
@@ -191,7 +188,7 @@ def _diagnosed(one: argparse.Namespace, other: argparse.Namespace) -> list[Any]:
         same_log = bool(found) and _but_for(side, "model") == _but_for(one, "model")
         if same_log and side.model == one.model:
             return [*found, *found]
-        model, frame, tau = read_model_and_log(side, check=False)  # a diagnosis checks it
+        _, model, frame, tau, _ = read_inputs(side, check=False)  # a diagnosis checks it
         diagnosis: Any = earlier_diagnosis(side, model, frame, tau)
         if diagnosis is None:
             checks = getattr(found[0], "checks", None) if same_log else None

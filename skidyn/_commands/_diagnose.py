@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from skidyn._commands._arguments import JsonFile, Page, command, with_controller, with_log
 from skidyn._commands._earlier import stored
-from skidyn._commands._input import read_driven
+from skidyn._commands._input import read_inputs
 from skidyn._commands._kept import Kept, noting
 from skidyn._commands._output import (
     explain_motion,
@@ -153,7 +153,7 @@ def _answer(options: argparse.Namespace) -> dict[str, Any]:
 
 def _diagnosed(options: argparse.Namespace) -> tuple[Diagnosis, pd.DataFrame]:
     """The diagnosis of the log read with the options, and the log."""
-    model, frame, tau, controller = read_driven(options, check=False)
+    _, model, frame, tau, controller = read_inputs(options, check=False)
     diagnosis = run_diagnosis(model, frame, tau, options, controller=controller)
     return diagnosis, frame
 

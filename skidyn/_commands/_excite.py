@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import Input, Motion, command, with_reading
-from skidyn._commands._input import json_option, read_model_and_log, read_robot
+from skidyn._commands._input import json_option, read_inputs, read_robot
 from skidyn._commands._output import print_json, working
 from skidyn._exceptions import SkidynError
 
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> None:
     recorded: Any = ()
     if options.recorded:
         options.logs, options.nominal = options.recorded, False
-        model, recorded, tau = read_model_and_log(options)
+        _, model, recorded, tau, _ = read_inputs(options)
         with working("Identifying", options):
             model.fit(recorded, tau)
     with working("Designing the motion", options):

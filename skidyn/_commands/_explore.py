@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import command, with_controller, with_log
-from skidyn._commands._input import covered_joints, read_checked, reading
+from skidyn._commands._input import covered_joints, find_suspicions, read_inputs, reading
 from skidyn._commands._output import print_suspicions, working
 
 DESCRIPTION = """\
@@ -45,7 +45,8 @@ def run(options: argparse.Namespace) -> None:
 
     from skidyn.explorer import Session, serve
 
-    model, frame, tau, controller, checks = read_checked(options)
+    robot, model, frame, tau, controller = read_inputs(options, check=False)
+    checks = find_suspicions(frame, robot, options)
     with working("Preparing", options):
         session = Session(model, frame, tau)
 

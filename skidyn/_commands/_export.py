@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import Input, Output, command, with_controller, with_log
-from skidyn._commands._input import json_option, read_model_and_log
+from skidyn._commands._input import json_option, read_inputs
 from skidyn._commands._output import print_json, working
 from skidyn._exceptions import SkidynError
 from skidyn._writing import writable
@@ -94,7 +94,7 @@ def run(options: argparse.Namespace) -> None:
     for form, path in files.items():
         if form != "ros2":
             writable(path)
-    model, frame, tau = read_model_and_log(options)
+    _, model, frame, tau, _ = read_inputs(options)
     model.set_params(consistent=options.consistent)
     with working("Identifying", options):
         model.fit(frame, tau)

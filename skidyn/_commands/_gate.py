@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._commands._input import read_model_and_log, read_robot
+from skidyn._commands._input import read_inputs
 from skidyn._commands._output import print_json
 from skidyn._exceptions import SkidynError
 from skidyn._text import listed
@@ -26,9 +26,9 @@ FOLDS = 4
 def gate(options: argparse.Namespace) -> bool:
     """Print the ratio of errors of every joint; True if none is above the limit."""
     _check(options)
-    model, frame, tau = read_model_and_log(options)
+    robot, model, frame, tau, _ = read_inputs(options)
     healthy = argparse.Namespace(**{**vars(options), "logs": options.against})
-    _, usual_frame, usual_tau = read_model_and_log(healthy)
+    _, _, usual_frame, usual_tau, _ = read_inputs(healthy)
     from skidyn.metrics import drift
     from skidyn.model_selection import TrajectoryKFold
 
@@ -58,7 +58,7 @@ def gate(options: argparse.Namespace) -> bool:
             "ratio": float(result.ratio[j]),
             "failed": bool(failed[j]),
         }
-        for j, name in enumerate(read_robot(options).joint_names)
+        for j, name in enumerate(robot.joint_names)
     ]
     if options.junit:
         _write_junit(options.junit, joints, options.fail_above)

@@ -7,7 +7,7 @@ import argparse
 from typing import Any
 
 from skidyn._commands._arguments import JsonFile, command, with_controller, with_log
-from skidyn._commands._input import read_checked
+from skidyn._commands._input import find_suspicions, read_inputs
 from skidyn._commands._output import parameters, print_json, print_suspicions, working
 from skidyn._writing import write_json
 
@@ -62,7 +62,8 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    model, frame, tau, controller, checks = read_checked(options)
+    robot, model, frame, tau, controller = read_inputs(options, check=False)
+    checks = find_suspicions(frame, robot, options)
     model.set_params(
         consistent=options.consistent, estimator=options.estimator, prior_std=options.prior_std
     )

@@ -35,52 +35,36 @@ AS_GIVEN = (
 )  # fmt: skip
 
 
-def read_model_and_log(
+def read_inputs(
     options: argparse.Namespace, *, check: bool = True
-) -> tuple[RBDRegressor, pd.DataFrame, Any]:
-    """The model of the options, the log, and its torques."""
-    return read_driven(options, check=check)[:3]
-
-
-def read_driven(
-    options: argparse.Namespace, *, check: bool = True
-) -> tuple[RBDRegressor, pd.DataFrame, Any, Controller | None]:
-    """The same with the controller of the options, which may determine the torques."""
-    return _driven(options, read_robot(options), check)
-
-
-def read_checked(
-    options: argparse.Namespace,
-) -> tuple[RBDRegressor, pd.DataFrame, Any, Controller | None, tuple[Suspicion, ...]]:
-    """The same with suspicions about the log, which head the result instead of being warnings."""
-    robot = read_robot(options)
-    model, frame, tau, controller = _driven(options, robot, check=False)
-    with working("Checking", options):
-        return model, frame, tau, controller, find_suspicions(frame, robot)
-
-
-def _driven(
-    options: argparse.Namespace, robot: Robot, check: bool
-) -> tuple[RBDRegressor, pd.DataFrame, Any, Controller | None]:
-    """Model, log, torques and controller of the options for a robot."""
+) -> tuple[Robot, RBDRegressor, pd.DataFrame, Any, Controller | None]:
+    """Robot, model, log, torques, and the controller of the options, which may determine these."""
     from skidyn._persistence import load_model
     from skidyn.identification import RBDRegressor
 
-    frame, tau, controller = _log(options, robot, check)
+    robot = read_robot(options)
+    frame, tau, controller = read_driven(options, robot, check=check)
+    if controller is not None and tau is None:
+        from skidyn.simulation import servo_torque
+
+        tau = servo_torque(controller, frame)
     if options.model.endswith(".skops"):
-        return load_model(options.model), frame, tau, controller
+        return robot, load_model(options.model), frame, tau, controller
     effects = effects_option(options.model)
     model = RBDRegressor(robot, effects, "nominal" if options.nominal else "identified")
-    return model, frame, tau, controller
+    return robot, model, frame, tau, controller
 
 
-def find_suspicions(frame: pd.DataFrame, robot: Robot) -> tuple[Suspicion, ...]:
-    """Suspicions about a log, the most influential first; none without torque."""
+def find_suspicions(
+    frame: pd.DataFrame, robot: Robot, options: argparse.Namespace
+) -> tuple[Suspicion, ...]:
+    """Suspicions about a log, the most influential first, to head a result; none without torque."""
     from skidyn.logs import check_log
 
     if "tau1" not in frame:
         return ()
-    quality = check_log(frame, robot)
+    with working("Checking", options):
+        quality = check_log(frame, robot)
     for fault in quality.faults:
         warn_about_log(fault)
     # wrong bodies of the description are not an error of the log
@@ -97,26 +81,16 @@ def effects_option(text: str) -> tuple[str, ...]:
     return tuple(kind for kind in kinds if kind != "rigid_body")
 
 
-def _log(
-    options: argparse.Namespace, robot: Robot, check: bool
+def read_driven(
+    options: argparse.Namespace, robot: Robot, *, check: bool = True
 ) -> tuple[pd.DataFrame, Any, Controller | None]:
-    """The log, its torques or those of its servos, and the controller of the options."""
+    """The log, its torques (None if it has only commands), and the controller of the options."""
     text = getattr(options, "controller", None)
     frame = read_frame(options, robot, check=check, needs_torque=text is None)
-    if text is None:
-        return frame, torque_of(frame, robot), None
-    logged = torque_of(frame, robot) if "tau1" in frame else None
-    controller = read_controller(text, robot, frame, logged)
-    if logged is not None:
-        return frame, logged, controller
-    from skidyn.simulation import servo_torque
-
-    return frame, servo_torque(controller, frame), controller
-
-
-def torque_of(frame: pd.DataFrame, robot: Robot) -> Any:
-    """The logged torques, shape (n_samples, n_joints)."""
-    return frame[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()
+    logged = None
+    if text is None or "tau1" in frame:
+        logged = frame[[f"tau{j + 1}" for j in range(robot.n_joints)]].to_numpy()
+    return frame, logged, None if text is None else read_controller(text, robot, frame, logged)
 
 
 def read_frame(

@@ -77,7 +77,9 @@ class Kept:
         """Store an answer, unless a file has changed since the command began."""
         if self._name is None or _name(self._options) != self._name:
             return
-        body = zlib.compress(json.dumps(answer, default=_of_numpy).encode(), 1)
+        # arrays and numbers of NumPy in JSON types; numbers that are not finite are kept
+        text = json.dumps(answer, default=lambda found: found.tolist())
+        body = zlib.compress(text.encode(), 1)
         with suppress(OSError, SkidynError):
             write_bytes(self._path, hashlib.sha256(body).digest() + body)
             kept = sorted(self._path.parent.iterdir(), key=lambda path: path.stat().st_mtime)
@@ -87,11 +89,6 @@ class Kept:
     @property
     def _path(self) -> Path:
         return Path(self._options.logs[0]).parent / FOLDER / f"{self._name}.answer"
-
-
-def _of_numpy(found: Any) -> Any:
-    """Arrays and numbers of NumPy in JSON types; numbers that are not finite are kept."""
-    return found.tolist()
 
 
 def _name(options: argparse.Namespace) -> str | None:

@@ -121,8 +121,7 @@ def _numbers(text: str) -> list[float]:
 def _read(options: argparse.Namespace, robot: Robot) -> tuple[pd.DataFrame, tuple[Suspicion, ...]]:
     """A log, and suspicions about it; currents have another scale than torques by themselves."""
     frame = read_frame(options, robot, check=False)
-    with working("Checking", options):
-        found = find_suspicions(frame, robot)
+    found = find_suspicions(frame, robot, options)
     if options.known_mass is not None:
         found = tuple(check for check in found if check.check != "torque_scale")
     return frame, found

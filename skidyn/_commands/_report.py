@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import Page, command, with_report
-from skidyn._commands._input import read_driven, recorded_options
+from skidyn._commands._input import read_inputs, recorded_options
 from skidyn._commands._output import (
     explain_motion,
     print_json,
@@ -35,7 +35,8 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> None:
     options = recorded_options(options)
-    model, frame, tau, controller = read_driven(options, check=False)  # a diagnosis checks it
+    # a diagnosis checks the log
+    _, model, frame, tau, controller = read_inputs(options, check=False)
     diagnosis = run_diagnosis(model, frame, tau, options, controller=controller)
     explain_motion(diagnosis, frame, options)
     write_page(diagnosis, options.html, provenance(options, frame.attrs["notes"]))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import Motion, command, with_report
-from skidyn._commands._input import read_model_and_log, recorded_options
+from skidyn._commands._input import read_inputs, recorded_options
 from skidyn._commands._output import print_json, run_diagnosis, working
 
 DESCRIPTION = """\
@@ -38,7 +38,8 @@ def run(options: argparse.Namespace) -> None:
     from skidyn.diagnosis import design_separating_motion
 
     options = recorded_options(options)
-    model, frame, tau = read_model_and_log(options, check=False)  # a diagnosis checks it
+    # a diagnosis checks the log
+    _, model, frame, tau, _ = read_inputs(options, check=False)
     diagnosis = run_diagnosis(model, frame, tau, options)
     with working("Designing the motion", options):
         motion = design_separating_motion(

@@ -9,13 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import Input, Output, command, with_controller, with_joints
-from skidyn._commands._controllers import read_controller
-from skidyn._commands._input import (
-    embedded_robot,
-    joint_numbers,
-    read_frame,
-    torque_of,
-)
+from skidyn._commands._input import embedded_robot, joint_numbers, read_driven
 from skidyn._commands._output import print_json, working, write_table
 from skidyn._exceptions import SkidynError
 from skidyn._text import joints_told
@@ -118,14 +112,10 @@ def _along(options: argparse.Namespace) -> None:
         raise SkidynError(f"{options.out}: the motion to write must end in .csv or .parquet")
     model = load_model(options.model)
     robot = model.robot_
-    frame = read_frame(options, robot, needs_torque=options.controller is None)
+    frame, tau, controller = read_driven(options, robot)
     said: dict[str, Any] = {"horizon": options.horizon or None, "engine": options.engine}
-    tau = None
-    if options.controller is None:
-        tau = torque_of(frame, robot)
-    else:
-        logged = torque_of(frame, robot) if "tau1" in frame else None
-        said["controller"] = read_controller(options.controller, robot, frame, logged)
+    if controller is not None:
+        tau, said["controller"] = None, controller
     with working("Simulating", options):
         found = simulation_errors(model, frame, tau, **said)
         if options.out is not None:

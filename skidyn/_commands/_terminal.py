@@ -79,16 +79,12 @@ class TeachingFormatter(argparse.RawDescriptionHelpFormatter):
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         lines = []
-        for example, group in groupby(text.splitlines(), key=_is_example):
+        for example, group in groupby(text.splitlines(), lambda x: x.startswith("  ") or not x):
             if example:
                 lines += [_example(line, width) for line in group]
             else:
                 lines.append(textwrap.fill(" ".join(group), width))
         return "\n".join(lines)
-
-
-def _is_example(line: str) -> bool:
-    return line.startswith("  ") or not line
 
 
 def _example(line: str, width: int) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -125,19 +125,8 @@ def fetch_recording(
     return Bunch(frame=frame, licence=recording.licence, paths=told, **recording.known)
 
 
-def _read_emps(paths: Sequence[Path]) -> pd.DataFrame:
-    columns = {"time": "t", "q": "qm", "i": "vir"}
-    return read_log(paths, columns=columns, drive_gains=[EMPS_GAIN], check=False)
-
-
-def _read_pendulum(paths: Sequence[Path]) -> pd.DataFrame:
-    columns = {
-        "time": "time",
-        "q": ["pos_meas1", "pos_meas2"],
-        "dq": ["vel_meas1", "vel_meas2"],
-        "tau": ["tau_meas1", "tau_meas2"],
-    }
-    return read_log(paths, columns=columns, check=False)
+def _read(**options: Any) -> Callable[[Sequence[Path]], pd.DataFrame]:
+    return partial(read_log, check=False, **options)
 
 
 def _read_gaz(paths: Sequence[Path]) -> pd.DataFrame:
@@ -243,14 +232,14 @@ RECORDINGS = {
         "93afc131780fb1d5477472935a18ac8405683890/examples/EMPS/data",
         ("DATA_EMPS.mat",),
         "Apache-2.0",
-        _read_emps,
+        _read(columns={"time": "t", "q": "qm", "i": "vir"}, drive_gains=[EMPS_GAIN]),
     ),
     "panda_exciting": _Recording(
         "https://raw.githubusercontent.com/unisa-acg/inverse-dynamics-solver/"
         "73217267f30e3aaba229b63233c8fdb628ba156b/inverse_dynamics_interface_franka_inria/bagfiles",
         ("panda_exciting_trajectory.db3",),
         "BSD-3-Clause",
-        partial(read_log, check=False),
+        _read(),
     ),
     "panda_gaz": _Recording(
         "https://raw.githubusercontent.com/marcocognetti/FrankaEmikaPandaDynModel/"
@@ -265,7 +254,9 @@ RECORDINGS = {
         "data/experiment_records/design_C.0/20220914/sys_id",
         tuple(f"trajectory_{k:02d}.csv" for k in (0, 1, 2, 3, 4, 5, 6, 12, 13)),
         "BSD-3-Clause",
-        _read_pendulum,
+        _read(
+            columns={"time": "time", "q": "pos_meas{i}", "dq": "vel_meas{i}", "tau": "tau_meas{i}"}
+        ),
     ),
     "xl330": _Recording(
         "https://raw.githubusercontent.com/Rhoban/bam/"

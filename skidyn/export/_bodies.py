@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._exceptions import SkidynError
-from skidyn.dynamics import central_parts
+from skidyn.dynamics import central_parts, inertial_vector
 from skidyn.effects import Term, get_effect
 from skidyn.export._model import check_model, is_carried, is_lasting
 from skidyn.identification import RBDRegressor
@@ -77,7 +77,7 @@ def mjcf_inertial(central: CentralInertia) -> ElementTree.Element:
 def about_origin(mass: float, center: np.ndarray, central: np.ndarray) -> np.ndarray:
     """The ten parameters from mass, centre of mass and the inertia about it."""
     inertia = central + mass * (center @ center * np.eye(3) - np.outer(center, center))
-    return np.asarray(np.r_[mass, mass * center, inertia[np.triu_indices(3)]])
+    return inertial_vector(mass, mass * center, inertia)
 
 
 @dataclass(frozen=True)

@@ -29,19 +29,8 @@ class SeriesJoint:
 
     The motor's joint keeps its name, friction, armature and actuator, and its coordinate is the
     logged position; that of the passive joint is the position of the link minus that of the motor.
-
-    Parameters
-    ----------
-    place : int
-        Joint of the robot, from 0.
-    name : str
-        Name of the passive joint.
-    stiffness : float, N m/rad or N/m
-        Stiffness of the gear; 0 for a gap.
-    damping : float, N m s/rad or N s/m
-        Damping parallel to the stiffness; 0 for a gap.
-    gap : float, rad or m
-        Whole play; 0 for an elastic gear.
+    ``place`` is the joint of the robot, from 0. A gap (rad or m, the whole play) has no stiffness
+    (N m/rad or N/m) and no damping parallel to it.
     """
 
     place: int
@@ -51,15 +40,10 @@ class SeriesJoint:
     gap: float = 0.0
 
     def attributes(self, per_unit: float = 1.0) -> dict[str, str]:
-        """Attributes other than those that place the joint.
+        """Attributes other than those that place the joint; ``per_unit`` is one rad in the file.
 
         All are given, since MuJoCo takes missing ones from defaults of the file, which are those of
         the motor's joint.
-
-        Parameters
-        ----------
-        per_unit : float
-            Size of one rad in the file's unit of angles; 1 for sliders.
         """
         half = self.gap / 2 * per_unit
         return {
@@ -80,22 +64,7 @@ class SeriesJoint:
 def series_joints(
     model: RBDRegressor | Robot, own: Description
 ) -> tuple[dict[Term, SeriesJoint], dict[Term, str]]:
-    """Passive joints for effects of a model, and reasons why other such effects have none.
-
-    Parameters
-    ----------
-    model : RBDRegressor or Robot
-        Fitted model; a robot has no such effects.
-    own : Description
-        Its parts, with elasticity and backlash among those that are left.
-
-    Returns
-    -------
-    joints : dict of Term to SeriesJoint
-        By effect.
-    reasons : dict of Term to str
-        Reasons in words, by effect.
-    """
+    """Passive joints for effects left in the description, and reasons why other such have none."""
     joints: dict[Term, SeriesJoint] = {}
     reasons: dict[Term, str] = {}
     if isinstance(model, Robot):
@@ -151,25 +120,9 @@ def insert_series(
 ) -> dict[Term, str]:
     """Insert passive joints after those of their motors, or replace those of an earlier export.
 
-    Parameters
-    ----------
-    edits : Edits
-        The user's MJCF.
-    motors, bodies : mapping of str to Element
-        Joints of the file, and the bodies that contain them, by name of the joint.
-    taken : collection of str
-        Names of all joints, including those of included files.
-    n_keyframes : int
-        Number of keyframes, including those of included files.
-    joints : dict of Term to SeriesJoint
-        Passive joints; those that cannot be inserted are removed from it.
-    robot : Robot
-        Robot of the model.
-
-    Returns
-    -------
-    dict of Term to str
-        Reasons why effects have no joint in this file.
+    ``motors`` and ``bodies`` are the joints of the file and their bodies, by name of the joint;
+    included files count in the names ``taken`` and in the keyframes. Joints that cannot be inserted
+    are removed from ``joints``, and the reasons returned.
     """
     compiler = edits.root.find("compiler")
     degrees = compiler is None or compiler.attributes.get("angle", "degree") == "degree"

@@ -33,10 +33,8 @@ def read_parquet_channels(path: Path, max_bytes: int) -> list[Channel]:
     """Read a Parquet or Feather table; list columns become one column per joint."""
     arrow = import_optional("pyarrow", extra="io")
     try:
-        if path.suffix.lower() == ".parquet":
-            columns = _joined(_parquet_batches(path, max_bytes), Budget(path, max_bytes))
-        else:
-            columns = _joined(_feather_batches(path, max_bytes), Budget(path, max_bytes))
+        batches = _parquet_batches if path.suffix.lower() == ".parquet" else _feather_batches
+        columns = _joined(batches(path, max_bytes), Budget(path, max_bytes))
     except arrow.ArrowException as error:
         raise LogError(f"{path}: cannot be read as a table: {error}") from error
     blocks: dict[str, Any] = {}

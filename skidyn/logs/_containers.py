@@ -159,6 +159,7 @@ def _numeric_groups(
     file: Any, datasets: Sequence[Any], budget: Budget
 ) -> tuple[dict[str, dict[str, np.ndarray]], list[str]]:
     """Numeric arrays of an HDF5 file by group, and the names of joints."""
+    h5py = import_optional("h5py", extra="io")
     groups: dict[str, dict[str, np.ndarray]] = {}
     names: list[str] = []
     for item in datasets:
@@ -174,7 +175,9 @@ def _numeric_groups(
                 for field in item.dtype.names
                 if item.dtype[field].kind in "fiub"
             }
-        elif _holds_references(item) and "MATLAB_class" not in item.attrs:
+        elif (
+            h5py.check_ref_dtype(item.dtype) is h5py.Reference and "MATLAB_class" not in item.attrs
+        ):
             for k, reference in enumerate(np.ravel(item[()])):  # a field of a struct array
                 part = file[reference] if reference else None
                 if part is not None and hasattr(part, "dtype") and part.dtype.kind in "fiub":
@@ -184,12 +187,6 @@ def _numeric_groups(
         elif item.ndim in (1, 2) and item.dtype.kind in "fiub":
             groups.setdefault(group, {})[name] = _samples_first(item[()])
     return {name: arrays for name, arrays in groups.items() if arrays}, names
-
-
-def _holds_references(item: Any) -> bool:
-    """Whether the elements of a dataset are references to others, as in files of MATLAB."""
-    h5py = import_optional("h5py", extra="io")
-    return h5py.check_ref_dtype(item.dtype) is h5py.Reference
 
 
 def _names(file: Any, item: Any, budget: Budget) -> list[str]:

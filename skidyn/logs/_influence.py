@@ -33,24 +33,8 @@ def by_influence(
 
     The influence is the share of the error of the robot's model that a remedy alone removes.
     Certain suspicions stay before suspected ones, and those without a known influence come last.
-
-    Parameters
-    ----------
-    frame : DataFrame
-        The log, as :func:`skidyn.logs.read_log` returns it.
-    robot : Robot
-        Its robot according to the description.
-    checks : sequence of Suspicion
-        Suspicions about the log.
-    measured : callable
-        Makes a measurement of a log and a robot.
-    corrected : Robot, optional
-        The robot with which the checks have replaced it, whose correction has an influence as well.
-
-    Returns
-    -------
-    list of Suspicion
-        The same suspicions.
+    ``robot`` is that of the description; the correction by which the checks have replaced it has an
+    influence as well.
     """
     from skidyn.measurement import CERTAINTIES, errors_of_fits
 

@@ -26,11 +26,6 @@ class Placeholders:
 
     A value is compared with the numbers of the file, and where it is none of these, with those in
     SI units after all other changes of columns, which the checks state.
-
-    Parameters
-    ----------
-    asked : float, sequence of float, mapping or None
-        As in ``read_log``.
     """
 
     def __init__(self, asked: Placeholder | None) -> None:
@@ -92,18 +87,7 @@ class Placeholders:
 
 
 def refuse_absent(notes: Sequence[str]) -> None:
-    """Raise if a placeholder is in none of the files, by the notes on all of them.
-
-    Parameters
-    ----------
-    notes : sequence of str
-        As of :meth:`Placeholders.notes`, with the counts of all files.
-
-    Raises
-    ------
-    LogError
-        With the value and where it was looked for.
-    """
+    """Raise a LogError if a placeholder is in none of the files, by the notes on all of them."""
     for note in notes:
         if hit := _NOWHERE.match(note):
             where = "the signals" if hit[1] == "all" else hit[1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -24,28 +24,6 @@ MOTION = ("q", "dq", "ddq", "cmd")
 QUANTITIES = (*MOTION, "tau", "temp")
 #: Share of the largest torque below zero that a magnitude may reach.
 BELOW = 0.01
-#: Beginning of the notes of remedies.
-REMEDIES = (
-    "flip:",
-    "combine:",
-    "gain:",
-    "summed:",
-    "zero:",
-    "gravity:",
-    "clock:",
-    "late:",
-    "lowpass:",
-    "drop_repeated:",
-    "torque_sign:",
-    "split_leaps:",
-    "restore_gravity:",
-    "derive:",
-    "unwrap:",
-    "placeholder:",
-    "missing:",
-    "order:",
-    "resample:",
-)
 
 
 @dataclass(frozen=True)
@@ -68,6 +46,10 @@ class Remedies:
     restore_gravity: bool = False
     derive: Sequence[str] = ()
     placeholder: Placeholder | None = None
+
+
+#: Beginnings of the notes of remedies; the last three are options of their own.
+REMEDIES = tuple(f"{f.name}:" for f in fields(Remedies)) + ("gravity:", "missing:", "resample:")
 
 
 def mend_columns(

@@ -22,6 +22,7 @@ from skidyn._columns import ColumnSpec
 from skidyn._compat import CallbackSupportMixin, Interval, StrOptions, fit_context, fit_progress
 from skidyn._keys import Keys, fitted_keys
 from skidyn._order import taken, time_order
+from skidyn._signals import Array
 from skidyn.model_selection import order_of_log
 from skidyn.neural_network._engine import (
     Network,
@@ -38,8 +39,6 @@ from skidyn.neural_network._network import LSTMNetwork, Weights
 from skidyn.neural_network._parameters import SkorchParameters
 from skidyn.neural_network._stream import TorqueStream
 from skidyn.preprocessing import scaling_of
-
-Array = NDArray[np.float64]
 
 #: Number of fits that are trained side by side in one process.
 SIDE_BY_SIDE = 10
@@ -200,16 +199,13 @@ class SequenceRegressor(
         scaled_inputs = ((inputs - self.input_offset_) / self.input_scale_).astype(np.float32)
         scaled_targets = (targets - self.output_offset_) / self.output_scale_
         tasks = []
-        for k, outputs in enumerate(self._output_groups(targets.shape[1])):
+        every = list(range(targets.shape[1]))
+        for k, outputs in enumerate([[j] for j in every] if self.per_joint else [every]):
             own_seed = (seed + k) % 2**31
             made_with = self._network(inputs.shape[1], len(outputs), own_seed)
             own = scaled_targets[:, outputs]
             tasks.append(Task(self._module, made_with, scaled_inputs, own, weight, own_seed))
         return tasks
-
-    def _output_groups(self, n_outputs: int) -> list[list[int]]:
-        """Outputs of each network."""
-        return [[j] for j in range(n_outputs)] if self.per_joint else [list(range(n_outputs))]
 
     def _store(self, training: Training, numbers: Sequence[int]) -> None:
         """Store the results of the networks with these numbers, which are this estimator's."""
@@ -313,18 +309,8 @@ class SequenceRegressor(
 class PendingFit:
     """A prepared fit: data checked, sample weights drawn, nothing trained yet.
 
-    Attributes
-    ----------
-    estimator : SequenceRegressor
-        Regressor to be fitted.
-    X, y, weight : ndarray
-        All rows, and the weight of each row including the bootstrap.
-    validation : ndarray of bool or None
-        Rows whose loss decides when to stop.
-    keys : Keys
-        Key columns of X.
-    seed : int
-        Seed of initial weights, order of windows and dropout.
+    The weight of a row includes the bootstrap; the loss of ``validation`` rows decides when to
+    stop. The seed is that of initial weights, order of windows and dropout.
     """
 
     estimator: SequenceRegressor

@@ -32,13 +32,12 @@ from skidyn._columns import ColumnSpec
 from skidyn._compat import HasMethods, Interval, StrOptions, fit_context
 from skidyn._keys import Keys, fitted_keys
 from skidyn._order import folds_taken, taken, time_order
+from skidyn._signals import Array
 from skidyn.model_selection import held_out_folds, order_of_log
 from skidyn.neural_network._base import SequenceRegressor, deferred_training, train_together
 from skidyn.neural_network._lstm import LSTMRegressor, directions
 from skidyn.neural_network._skorch_member import SkorchMember
 from skidyn.preprocessing import without_keys_inside
-
-Array = NDArray[np.float64]
 
 #: Number of folds of the trajectories; each member leaves out one of them.
 FOLDS = 20

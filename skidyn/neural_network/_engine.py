@@ -16,6 +16,7 @@ from skorch.helper import predefined_split
 from torch import nn
 
 from skidyn._compat import FitProgress
+from skidyn._signals import Array
 from skidyn.neural_network._network import (
     LSTMNetwork,
     Members,
@@ -26,8 +27,6 @@ from skidyn.neural_network._network import (
 )
 from skidyn.neural_network._stacked import StackedNetwork
 from skidyn.neural_network._windows import WindowLoader, WindowSet, window_rows, window_starts
-
-Array = NDArray[np.float64]
 
 #: Rows per call of the network in prediction; more rows would only need more memory.
 ROWS_AT_ONCE = 65536

@@ -7,15 +7,13 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._columns import _key_column
 from skidyn._compat import StrOptions
 from skidyn._keys import Keys
+from skidyn._signals import Array
 from skidyn.neural_network._base import SequenceRegressor
 from skidyn.neural_network._engine import Plan
-
-Array = NDArray[np.float64]
 
 #: Weight decay of networks without physics.
 WEIGHT_DECAY = 0.3
@@ -38,17 +36,7 @@ class LSTMRegressor(SequenceRegressor):
 
     Parameters
     ----------
-    per_joint : bool, default=False
-        Train one network per output instead of one for all.
-    linear : bool, default=True
-        Add a linear function of the row itself to the output. Torque is nearly linear in the
-        acceleration, also beyond the training range, where an LSTM is flat.
-    direction : "auto", sequence of int or str, or None, default="auto"
-        Velocities whose sign is a further input, since friction changes sign with it: ``"auto"``
-        takes the columns whose names begin with ``dq``, and none if X has no names.
-    window : int, default=1
-        Rows of history: each prediction uses at least `window` and less than `window + stride`
-        earlier rows. A torque that depends on a longer past needs more.
+    {OWN_PARAMETERS}
     {PARAMETERS}
 
     Attributes
@@ -143,17 +131,7 @@ class NDLRegressor(LSTMRegressor):
         Width of the fully connected layer (tanh; the paper does not state its activation).
     dropout : float, default=0.1
         Share of the fully connected layer's outputs dropped in training.
-    per_joint : bool, default=False
-        Train one network per output instead of one for all.
-    linear : bool, default=True
-        Add a linear function of the row itself to the output. Torque is nearly linear in the
-        acceleration, also beyond the training range, where an LSTM is flat.
-    direction : "auto", sequence of int or str, or None, default="auto"
-        Velocities whose sign is a further input, since friction changes sign with it: ``"auto"``
-        takes the columns whose names begin with ``dq``, and none if X has no names.
-    window : int, default=1
-        Rows of history: each prediction uses at least `window` and less than `window + stride`
-        earlier rows. A torque that depends on a longer past needs more.
+    {OWN_PARAMETERS}
     {PARAMETERS}
 
     Attributes

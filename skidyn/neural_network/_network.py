@@ -51,24 +51,8 @@ class LSTMNetwork(nn.Module):
     """One LSTM layer, optionally a fully connected layer with dropout, and a linear output.
 
     Initial values: Glorot's for input weights, orthogonal matrices for the recurrence, 1 for the
-    bias of the forget gate, 0 for other biases and for the path around the LSTM.
-
-    Parameters
-    ----------
-    n_inputs, n_outputs : int
-        Widths.
-    window : int
-        Rows of history, for which there is no output.
-    hidden_size : int, default=32
-        Cells of the LSTM.
-    dense_size : int, default=0
-        Width of the fully connected layer; 0 for a network without this layer and dropout.
-    dropout : float, default=0.0
-        Share of its outputs dropped in training.
-    linear : bool, default=False
-        Add a linear path from the inputs of a row to its outputs, around the LSTM.
-    seed : int, default=0
-        Seed of initial weights and dropout.
+    bias of the forget gate, 0 for other biases and for the path around the LSTM (``linear``), from
+    the inputs of a row to its outputs. There is no output for the ``window`` rows of history.
     """
 
     def __init__(

@@ -61,6 +61,21 @@ PARAMETERS = """\
         integer gives bit-equal results whatever the number of processes.
 """
 
+#: Parameters of the regressors without physics; they replace the line ``{OWN_PARAMETERS}``.
+OWN_PARAMETERS = """\
+    per_joint : bool, default=False
+        Train one network per output instead of one for all.
+    linear : bool, default=True
+        Add a linear function of the row itself to the output. Torque is nearly linear in the
+        acceleration, also beyond the training range, where an LSTM is flat.
+    direction : "auto", sequence of int or str, or None, default="auto"
+        Velocities whose sign is a further input, since friction changes sign with it: ``"auto"``
+        takes the columns whose names begin with ``dq``, and none if X has no names.
+    window : int, default=1
+        Rows of history: each prediction uses at least `window` and less than `window + stride`
+        earlier rows. A torque that depends on a longer past needs more.
+"""
+
 #: Attributes of every fitted regressor; they replace the line ``{ATTRIBUTES}`` of docstrings.
 ATTRIBUTES = """\
     net_ : skorch.NeuralNet
@@ -79,6 +94,8 @@ ATTRIBUTES = """\
     feature_names_in_ : ndarray of str
         Names of the columns, if X has names.
 """
+
+_SHARED = {"OWN_PARAMETERS": OWN_PARAMETERS, "PARAMETERS": PARAMETERS, "ATTRIBUTES": ATTRIBUTES}
 
 
 def _without(shared: str, docstring: str) -> str:
@@ -108,10 +125,9 @@ class SkorchParameters:
                 ordered = sorted(merged.values(), key=lambda parameter: parameter.kind)
                 own.__signature__ = signature.replace(parameters=ordered)
         if cls.__doc__:
-            for place, shared in (("PARAMETERS", PARAMETERS), ("ATTRIBUTES", ATTRIBUTES)):
-                cls.__doc__ = cls.__doc__.replace(
-                    f"    {{{place}}}\n", _without(shared, cls.__doc__)
-                )
+            for place, shared in _SHARED.items():
+                own_entries = _without(shared, cls.__doc__)
+                cls.__doc__ = cls.__doc__.replace(f"    {{{place}}}\n", own_entries)
 
     def _set_skorch(self, parameters: dict[str, Any]) -> None:
         """Keep parameters named as in skorch; refuse all others."""

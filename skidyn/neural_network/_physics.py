@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from sklearn.base import clone
 
 from skidyn._columns import Columns
+from skidyn._signals import Array
 from skidyn.effects import TermSum
 from skidyn.identification import RBDRegressor
 from skidyn.robots import Robot
-
-Array = NDArray[np.float64]
 
 
 class BareRigidBody:

@@ -23,6 +23,7 @@ from skidyn._columns import Columns, column_names, resolve_columns
 from skidyn._compat import HasMethods, Interval, StrOptions
 from skidyn._keys import Keys
 from skidyn._order import folds_taken, taken, time_order
+from skidyn._signals import Array
 from skidyn.hybrid import TrainingRange, distances, fade, learned_weights
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import held_out_folds
@@ -32,8 +33,6 @@ from skidyn.neural_network._network import LSTMNetwork
 from skidyn.neural_network._physics import BareRigidBody, IdentifiedPhysics, robot_of
 from skidyn.preprocessing import scaling_of
 from skidyn.robots import Robot
-
-Array = NDArray[np.float64]
 
 #: Directions of the rigid-body parameters that change the torque by less than this fraction of the
 #: strongest direction cannot be identified from the log and stay at the robot's own values.

@@ -6,13 +6,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.utils.validation import validate_data
+
+from skidyn._signals import Array
 
 if TYPE_CHECKING:
     from skidyn.neural_network._base import SequenceRegressor
-
-Array = NDArray[np.float64]
 
 
 class TorqueStream:

@@ -85,7 +85,7 @@ def summarize_comparison(
             f"{labels[0]} has the joints {', '.join(first.joint_names)}, {labels[1]} has "
             f"{', '.join(second.joint_names)}; only diagnoses of the same joints can be compared"
         )
-    same = _same_log(first, second)
+    same = np.array_equal(first.comparison.measured, second.comparison.measured)
     signals = first.comparison.signals
     report = {
         "schema": "skidyn.comparison/1",
@@ -113,13 +113,6 @@ def summarize_comparison(
         }
     )
     return document
-
-
-def _same_log(first: Diagnosis, second: Diagnosis) -> bool:
-    one, other = first.comparison, second.comparison
-    return one.measured.shape == other.measured.shape and np.array_equal(
-        one.measured, other.measured
-    )
 
 
 def _side(diagnosis: Diagnosis, name: str, provenance: Mapping[str, Any]) -> dict[str, Any]:

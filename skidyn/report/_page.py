@@ -55,21 +55,9 @@ def _environment() -> Any:
         loader=jinja2.FunctionLoader(_resource),
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined,
     )  # fmt: skip
-    environment.filters.update(
-        number=number,
-        percent=percent,
-        change=change,
-        chance=chance,
-        words=words,
-        raised=raised,
-        breakable=breakable,
-        capital=capital,
-        short=short,
-        mathml=mathml,
-        meaning=meaning,
-        joints_told=joints_told,
-        listed=listed,
-    )
+    own = number, percent, change, chance, words, breakable, capital, short, mathml
+    for told in (*own, joints_told, listed, meaning, raised):
+        environment.filters[told.__name__] = told
     return environment
 
 

@@ -106,7 +106,8 @@ def describe_chain(
         moved[joint.name] = joint
         stack.extend((frame.name, child) for child in reversed(frame.children))
     first = moved[next(iter(moved))]
-    if first.kind == "fixed" and _stands_still(first):
+    still = np.all(first.rotation == np.eye(3)) and not np.any(first.translation)
+    if first.kind == "fixed" and still:
         del moved[first.name]  # the first frame is the base
     else:
         found = {root: Link(root, np.zeros(10)), **found}
@@ -166,10 +167,6 @@ def _largest(joint: Any, limit: str) -> float:
     """Larger of a joint's two limits of speed or effort; infinite if it has none."""
     pair = getattr(joint, limit, None)  # since pytorch-kinematics 0.7.5
     return np.inf if pair is None else float(np.max(np.abs(pair)))
-
-
-def _stands_still(joint: Joint) -> bool:
-    return bool(np.all(joint.rotation == np.eye(3)) and not np.any(joint.translation))
 
 
 def links_of(inertials: Mapping[str, Any]) -> dict[str, Link]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -40,21 +40,21 @@ class Mimic:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint between two links; lengths in m, angles in rad."""
+    """A joint between two links, by default fixed; lengths in m, angles in rad."""
 
     name: str
-    kind: str
-    parent: str
-    child: str
-    rotation: np.ndarray
-    translation: np.ndarray
-    axis: np.ndarray
-    position_limits: tuple[float, float]
-    velocity_limit: float
-    effort_limit: float
-    damping: float
-    friction: float
-    mimic: Mimic | None
+    kind: str = "fixed"
+    parent: str = ""
+    child: str = ""
+    rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
+    translation: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    axis: np.ndarray = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    position_limits: tuple[float, float] = (0.0, 0.0)
+    velocity_limit: float = 0.0
+    effort_limit: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
+    mimic: Mimic | None = None
 
     def placement(self, displacement: float) -> tuple[np.ndarray, np.ndarray]:
         """Orientation and origin of the child frame in the parent frame at a displacement."""
@@ -117,21 +117,7 @@ def between(joint: Joint, parent: str, child: str, pose: tuple[np.ndarray, np.nd
 
 def fixed_joint(name: str, parent: str, child: str, pose: tuple[np.ndarray, np.ndarray]) -> Joint:
     """A joint that holds a link at a pose in the frame of another one."""
-    return Joint(
-        name=name,
-        kind="fixed",
-        parent=parent,
-        child=child,
-        rotation=pose[0],
-        translation=pose[1],
-        axis=np.array([1.0, 0.0, 0.0]),
-        position_limits=(0.0, 0.0),
-        velocity_limit=0.0,
-        effort_limit=0.0,
-        damping=0.0,
-        friction=0.0,
-        mimic=None,
-    )
+    return Joint(name, "fixed", parent, child, *pose)
 
 
 def link_of(

@@ -22,7 +22,7 @@ from skidyn.robots._description import (
     fixed_joint,
     link_of,
 )
-from skidyn.robots._xml import parse_xml, read_description
+from skidyn.robots._xml import is_text, parse_xml, read_description
 
 
 def parse_mjcf(source: str | bytes | os.PathLike[str]) -> tuple[Description, np.ndarray]:
@@ -34,9 +34,8 @@ def parse_mjcf(source: str | bytes | os.PathLike[str]) -> tuple[Description, np.
     mujoco = import_optional("mujoco", extra="mujoco")
     data = read_description(source)
     parse_xml(data)
-    is_text = isinstance(source, bytes) or str(source).lstrip("\ufeff \t\r\n").startswith("<")
     try:
-        if is_text:
+        if is_text(source):
             model = mujoco.MjModel.from_xml_string(data.decode())
         else:  # by its path, so that included files and meshes are found
             model = mujoco.MjModel.from_xml_path(str(Path(source)))  # type: ignore[arg-type]
@@ -126,10 +125,6 @@ def _joint(
     joint = Joint(
         name=name,
         kind="prismatic" if slide else "revolute" if model.jnt_limited[j] else "continuous",
-        parent="",
-        child="",
-        rotation=np.eye(3),
-        translation=np.zeros(3),
         axis=axis / np.linalg.norm(axis),
         position_limits=limits,  # type: ignore[arg-type]
         velocity_limit=np.inf,

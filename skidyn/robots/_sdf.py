@@ -113,8 +113,9 @@ class _Reader:
             at = way[at]
         for frame, base in reversed(way.items()):
             element = self._elements[frame]
-            own = _own_pose(element, f"{element.tag} {frame!r}")
-            self._poses[frame] = _compose(self._poses[base], own)
+            turn, shift = _own_pose(element, f"{element.tag} {frame!r}")
+            rotation, translation = self._poses[base]
+            self._poses[frame] = rotation @ turn, rotation @ shift + translation
         return self._poses[name]
 
     def _base(self, name: str) -> str:
@@ -189,7 +190,7 @@ class _Reader:
         kind = word(element, "type", what)
         name = element.get("name", "")
         if kind == "fixed":
-            return fixed_joint(name, "", "", _IDENTITY)
+            return Joint(name)
         if kind not in ("revolute", "continuous", "prismatic"):
             raise RobotDescriptionError(
                 f"The {what} is of type {kind!r}; supported are revolute, continuous, prismatic "
@@ -209,10 +210,6 @@ class _Reader:
         return Joint(
             name=name,
             kind=kind,
-            parent="",
-            child="",
-            rotation=np.eye(3),
-            translation=np.zeros(3),
             axis=unit_axis(self._axis(element, axis, what), what),
             position_limits=(lower, upper),
             velocity_limit=limits["velocity"],
@@ -249,10 +246,6 @@ def _mimic(axis: ElementTree.Element, what: str) -> Mimic | None:
     factor, offset = _number(mimic, "multiplier", what, 1.0), _number(mimic, "offset", what, 0.0)
     reference = _number(mimic, "reference", what, 0.0)
     return Mimic(word(mimic, "joint", what), factor, offset - factor * reference)
-
-
-def _compose(first: Pose, second: Pose) -> Pose:
-    return first[0] @ second[0], first[0] @ second[1] + first[1]
 
 
 def _relative(base: Pose, pose: Pose) -> Pose:

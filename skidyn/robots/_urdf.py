@@ -30,14 +30,13 @@ from skidyn.robots._xml import numbers, only, required, word
 
 def parse_urdf(root: ElementTree.Element) -> Description:
     """Description of the robot in a ``<robot>`` element; RobotDescriptionError for a wrong one."""
-    refuse_repeated_names(root.iter("link"))
-    refuse_repeated_names(root.iter("joint"))
-    links = [_link(element) for element in root.findall("link")]
-    joints = [_joint(element) for element in root.findall("joint")]
+    links, joints = root.findall("link"), root.findall("joint")  # not those of transmissions
+    refuse_repeated_names(links)
+    refuse_repeated_names(joints)
     return Description(
         root.get("name") or "robot",
-        {link.name: link for link in links},
-        {joint.name: joint for joint in joints},
+        {link.name: link for link in map(_link, links)},
+        {joint.name: joint for joint in map(_joint, joints)},
     )
 
 

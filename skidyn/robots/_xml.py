@@ -17,11 +17,6 @@ from skidyn._exceptions import RobotDescriptionError
 #: Larger descriptions are refused; that of a humanoid takes 1 MB, without its meshes.
 MAX_BYTES = 64 * 2**20
 
-#: Elements that the dynamics needs; visual and collision shapes, drivers and simulator settings are
-#: omitted.
-_KEPT_IN_LINK = frozenset({"inertial"})
-_KEPT_IN_JOINT = frozenset({"origin", "parent", "child", "axis", "limit", "dynamics", "mimic"})
-
 
 def read_description(source: str | bytes | os.PathLike[str]) -> bytes:
     """Text of a description given as a path or as the text itself, neither empty nor too large."""
@@ -50,10 +45,14 @@ def read_description(source: str | bytes | os.PathLike[str]) -> bytes:
     return data
 
 
+def is_text(source: str | bytes | os.PathLike[str]) -> bool:
+    """Whether a source is the text of a description, not its path."""
+    return isinstance(source, bytes) or str(source).lstrip("\ufeff \t\r\n").startswith("<")
+
+
 def name_of(source: str | bytes | os.PathLike[str]) -> str:
     """Path of a description; a default one if the source is the text itself."""
-    is_text = isinstance(source, bytes) or str(source).lstrip("\ufeff \t\r\n").startswith("<")
-    return "robot.urdf.xacro" if is_text else os.fsdecode(source)
+    return "robot.urdf.xacro" if is_text(source) else os.fsdecode(source)
 
 
 def first_element(data: bytes) -> str:
@@ -64,7 +63,7 @@ def first_element(data: bytes) -> str:
 
 
 def parse_robot_element(data: bytes, path: str = "robot.urdf.xacro") -> ElementTree.Element:
-    """Root element with only links and joints, without anything that a parser could expand.
+    """Root element of a URDF, without anything that a parser could expand.
 
     A RobotDescriptionError with the path is raised for text that is not well-formed XML, has a
     document type or entity declaration, or is not a URDF.
@@ -83,13 +82,6 @@ def parse_robot_element(data: bytes, path: str = "robot.urdf.xacro") -> ElementT
             f"The description contains xacro macros; expand them first: xacro {shlex.quote(path)} "
             f"> {shlex.quote(expanded)} (pip install xacro installs it without ROS)."
         )
-    for element in list(root):
-        if element.tag == "link":
-            _keep(element, _KEPT_IN_LINK)
-        elif element.tag == "joint":
-            _keep(element, _KEPT_IN_JOINT)
-        else:
-            root.remove(element)
     return root
 
 
@@ -182,12 +174,6 @@ def _refuse_declarations(data: bytes) -> None:
         if isinstance(error, RobotDescriptionError):
             raise
         raise RobotDescriptionError(f"The description is not well-formed XML: {error}.") from error
-
-
-def _keep(element: ElementTree.Element, tags: frozenset[str]) -> None:
-    for child in list(element):
-        if child.tag not in tags:
-            element.remove(child)
 
 
 def _local(tag: str) -> str:

@@ -14,6 +14,7 @@ from sklearn.base import clone
 from skidyn._columns import names_of_table
 from skidyn._exceptions import SkidynError
 from skidyn._keys import keys_of
+from skidyn._order import taken
 from skidyn.forward import Controller
 from skidyn.identification import RBDRegressor
 from skidyn.simulation._score import (
@@ -97,14 +98,8 @@ class Setting:
     """A setting of the servo of one joint that differs from the stated one.
 
     It changes both the torque of the servos, to which a model is fitted, and the controller that
-    drives the simulated motion.
-
-    Parameters
-    ----------
-    joint : int
-        Joint, counted from 1.
-    values : mapping of str to float
-        By name of the argument of :class:`Controller`.
+    drives the simulated motion. Joints are counted from 1; values are by the names of the arguments
+    of :class:`Controller`.
     """
 
     joint: int
@@ -115,19 +110,10 @@ class Setting:
 class InTurn:
     """Results of additions one by one, and together.
 
-    Parameters
-    ----------
-    verdicts : list of SimulationVerdict or None
-        Verdict of every addition, in addition to previous ones that did not worsen the motion; None
-        if simulation gives no evidence.
-    added : list of bool
-        Whether the last model contains it: it neither worsens the motion nor is an effect that
-        cannot be simulated.
-    together : SimulationVerdict
-        The model with all added effects compared with the model without any.
-    compared : list of SimulationVerdict or None
-        Errors with and without every addition, also where they give no evidence; None if it cannot
-        be simulated.
+    ``verdicts`` are in addition to previous ones that did not worsen the motion, None if simulation
+    gives no evidence; ``compared`` has a verdict also then, and None only if the addition cannot be
+    simulated. ``added`` are those of the last model, which neither worsen the motion nor cannot be
+    simulated; ``together`` compares it with the model without any.
     """
 
     verdicts: list[SimulationVerdict | None]
@@ -214,10 +200,10 @@ def _held_out(
     """Errors of the simulated motion of every fold, by a model that has not seen it."""
     found = []
     for others, rows in folds:
-        fitted = model.with_effects(terms).fit(_rows(X, others), y[others])
+        fitted = model.with_effects(terms).fit(taken(X, others), y[others])
         drive = None if controller is not None else y[rows]
         found.append(
-            simulation_errors(fitted, _rows(X, rows), drive, controller=controller, horizon=horizon)
+            simulation_errors(fitted, taken(X, rows), drive, controller=controller, horizon=horizon)
         )
     return pooled_errors(found)
 
@@ -226,7 +212,3 @@ def _typical(errors: SimulationErrors) -> float:
     """Error of the median piece, relative to that of a model without forces."""
     sizes = errors.pieces / np.maximum(errors.resting, 1e-12)
     return float(np.median(np.sqrt(np.mean(sizes**2, axis=1))))
-
-
-def _rows(X: Any, rows: Rows) -> Any:
-    return X.iloc[rows] if hasattr(X, "iloc") else X[rows]

@@ -32,7 +32,7 @@ def run_mujoco(model: RBDRegressor, task: Any, step: float) -> tuple[Array, Arra
                 f"MuJoCo has no elements for {', '.join(left)}; simulate with engine='own'"
             )
         world = mujoco.MjModel.from_xml_path(str(path))
-    own = [model_joint(mujoco, world, name) for name in model.robot_.joint_names]
+    own = [int(world.joint(name).dofadr[0]) for name in model.robot_.joint_names]
     # Runge-Kutta if nothing is stiff; it can treat frictionloss, which is a constraint.
     world.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     world.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
@@ -59,12 +59,6 @@ def run_mujoco(model: RBDRegressor, task: Any, step: float) -> tuple[Array, Arra
             if not np.isfinite(data.qpos).all():
                 break
     return q, dq
-
-
-def model_joint(mujoco: Any, world: Any, name: str) -> int:
-    """Address of a joint in MuJoCo's vectors."""
-    index = mujoco.mj_name2id(world, mujoco.mjtObj.mjOBJ_JOINT, name)
-    return int(world.jnt_dofadr[index])
 
 
 def _force(task: Any, ends: Any, share: float, data: Any, own: list[int]) -> Array:

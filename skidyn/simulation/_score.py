@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import t as student_t
 
 from skidyn._exceptions import SkidynError
+from skidyn._plain import plain
 from skidyn._signals import Array
 from skidyn.forward import STEP, Controller, ForwardModel, Task, read_task, run
 from skidyn.identification import RBDRegressor
@@ -101,24 +102,11 @@ class SimulationErrors:
         dict
             All attributes, :attr:`score` and :attr:`text`; infinite numbers are None.
         """
-
-        def plain(values: Array) -> Any:
-            return [float(v) if np.isfinite(v) else None for v in values]
-
-        return {
-            "schema": "skidyn.simulation/1",
-            "joints": list(self.joint_names),
-            "units": list(self.units),
-            "horizon": self.horizon,
-            "position": plain(self.position),
-            "velocity": plain(self.velocity),
-            "final": plain(self.final),
-            "resting": plain(self.resting),
-            "n_pieces": len(self.pieces),
-            "n_lost": self.n_lost,
-            "score": self.score if np.isfinite(self.score) else None,
-            "text": self.text,
-        }
+        names = ("units", "horizon", "position", "velocity", "final", "resting")
+        content: dict[str, Any] = {"schema": "skidyn.simulation/1", "joints": self.joint_names}
+        content |= {name: getattr(self, name) for name in names}
+        content |= {"n_pieces": len(self.pieces), "n_lost": self.n_lost, "score": self.score}
+        return {key: plain(value) for key, value in {**content, "text": self.text}.items()}
 
 
 def simulation_errors(

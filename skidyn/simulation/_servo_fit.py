@@ -26,14 +26,9 @@ MOST = 2_000_000
 
 @dataclass(frozen=True)
 class Fit:
-    """Values of the parameters, and mean squared error of every piece, held out.
+    """Values of the parameters, mean over the halves, and mean squared error of every piece.
 
-    Attributes
-    ----------
-    values : dict of str to float
-        Mean over the halves.
-    left_out : ndarray of shape (n_pieces,)
-        Error with the fit to the other half; NaN without one.
+    ``left_out`` is the error with the fit to the other half, (n_pieces,); NaN without one.
     """
 
     values: dict[str, float]

@@ -405,11 +405,6 @@ def _encoder_noise(robot: Any, X: Any, smooth: Array) -> Array:
     return np.asarray(np.std(logged - smooth, axis=0))
 
 
-def _command_error(loop: JointLoop) -> float:
-    """Error of the command as a prediction of the position."""
-    return float(np.sqrt(np.mean((loop.command - loop.q)[loop.valid] ** 2)))
-
-
 def _name(joint: _Joint) -> _Answer | None:
     """The effect that explains the motion of a joint, if one does."""
     loop, plain = joint.loop, joint.plain
@@ -440,7 +435,8 @@ def _name(joint: _Joint) -> _Answer | None:
     if float(np.mean(whole[best].left_out < plain.left_out)) <= LEAST_PIECES:
         return None
     before, after, beside = (float(np.sqrt(fit.mean)) for fit in (plain, whole[best], whole[other]))
-    if not after < NEARER * _command_error(loop):
+    # the error of the command as a prediction of the position
+    if not after < NEARER * float(np.sqrt(np.mean((loop.command - loop.q)[loop.valid] ** 2))):
         return None
     values, ranges = whole[best].values, {**joint.ranges, **first[best][1]}
     halves = halves_told(best, values, *covariance(loop, ranges, values))

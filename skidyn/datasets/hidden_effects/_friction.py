@@ -3,14 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
 
+from skidyn._signals import Array
 from skidyn.datasets.hidden_effects._world import Outcome, Simulate, World
-
-Array = NDArray[np.float64]
 
 
 def rms(values: Array) -> Array:
@@ -18,73 +14,62 @@ def rms(values: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(values**2, axis=(0, 1))))
 
 
-def scaled(world: World, joints: Sequence[int], form: Array, size: float) -> tuple[Array, Array]:
-    """Coefficients that give each form (.., len(joints)) the desired size, and the torque."""
-    coefficient = size * world.scale[list(joints)] / np.maximum(rms(form), 1e-12)
-    torque = world.zeros()
-    torque[..., list(joints)] = coefficient * form
-    return coefficient, torque
+def scaled(world: World, j: list[int], form: Array, size: float) -> tuple[Array, Array]:
+    """Coefficients that give each form (.., len(j)) the desired size, and the torque."""
+    coefficient = size * world.scale[j] / np.maximum(rms(form), 1e-12)
+    return coefficient, world.on(j, coefficient * form)
 
 
-def viscous(world: World, joints: Sequence[int], size: float) -> Outcome:
+def viscous(world: World, j: list[int], size: float) -> Outcome:
     """Friction proportional to velocity."""
-    Fv, torque = scaled(world, joints, world.motion.dq[..., list(joints)], size)
-    return Outcome(list(joints), {"Fv": Fv}, "Fv*dq", torque)
+    Fv, torque = scaled(world, j, world.motion.dq[..., j], size)
+    return Outcome(j, {"Fv": Fv}, "Fv*dq", torque)
 
 
-def coulomb(world: World, joints: Sequence[int], size: float) -> Outcome:
+def coulomb(world: World, j: list[int], size: float) -> Outcome:
     """Dry friction; at rest it keeps the direction of the last motion."""
-    Fc, torque = scaled(world, joints, world.sign[..., list(joints)], size)
-    return Outcome(list(joints), {"Fc": Fc}, "Fc*sign(dq)", torque)
+    Fc, torque = scaled(world, j, world.sign[..., j], size)
+    return Outcome(j, {"Fc": Fc}, "Fc*sign(dq)", torque)
 
 
-def stribeck(world: World, joints: Sequence[int], size: float) -> Outcome:
+def stribeck(world: World, j: list[int], size: float) -> Outcome:
     """More dry friction at low speed."""
-    j = list(joints)
     vs = world.rng.uniform(0.07, 0.13, len(j)) * world.unit[j]
     form = np.exp(-((world.motion.dq[..., j] / vs) ** 2)) * world.sign[..., j]
     dF = size * world.scale[j]
-    torque = world.zeros()
-    torque[..., j] = dF * form
     parameters = {"dF": dF, "vs": vs, "delta": 2.0}
-    return Outcome(j, parameters, "dF*exp(-(|dq|/vs)^2)*sign(dq)", torque)
+    return Outcome(j, parameters, "dF*exp(-(|dq|/vs)^2)*sign(dq)", world.on(j, dF * form))
 
 
-def asymmetric_friction(world: World, joints: Sequence[int], size: float) -> Outcome:
+def asymmetric_friction(world: World, j: list[int], size: float) -> Outcome:
     """Viscous and dry friction that differ between the directions."""
-    j = list(joints)
     dFv, torque = scaled(world, j, np.abs(world.motion.dq[..., j]), size)
     dFc = 0.3 * size * world.scale[j]
     torque[..., j] += dFc
     return Outcome(j, {"dFv": dFv, "dFc": dFc}, "dFv*|dq| + dFc", torque)
 
 
-def nonlinear_viscous(world: World, joints: Sequence[int], size: float) -> Outcome:
+def nonlinear_viscous(world: World, j: list[int], size: float) -> Outcome:
     """Friction that grows with a power of velocity other than one."""
-    j = list(joints)
     power = float(world.rng.choice([0.5, 2.0]))
     dq = world.motion.dq[..., j]
     c, torque = scaled(world, j, np.abs(dq) ** power * np.sign(dq), size)
     return Outcome(j, {"c": c, "power": power}, "c*|dq|^power*sign(dq)", torque)
 
 
-def load_dependent_friction(world: World, joints: Sequence[int], size: float) -> Outcome:
+def load_dependent_friction(world: World, j: list[int], size: float) -> Outcome:
     """Dry friction proportional to the load of the gear."""
-    j = list(joints)
     mu, torque = scaled(world, j, np.abs(world.rigid[..., j]) * world.sign[..., j], size)
     return Outcome(j, {"mu": mu}, "mu*|tau_rigid_body|*sign(dq)", torque)
 
 
-def temperature_friction(world: World, joints: Sequence[int], size: float) -> Outcome:
+def temperature_friction(world: World, j: list[int], size: float) -> Outcome:
     """Viscous friction that falls exponentially as the joint warms up, dry friction linearly."""
-    j = list(joints)
     warm = world.temperature[..., j] - 30.0
     # at least +-20 % of friction over the session, for any requested size
     level = 4 * size * world.scale[j]
     dq, sign = world.motion.dq[..., j], world.sign[..., j]
     Fv = level / np.maximum(rms(dq), 1e-12)
-    torque = world.zeros()
-    torque[..., j] = Fv * (np.exp(-warm / 25.0) - 1) * dq - 0.004 * level * warm * sign
     centred = warm - warm.mean(axis=(0, 1))
     factor = np.exp(-warm / 25.0)
     slope = Fv * np.sum(centred * factor, axis=(0, 1)) / np.sum(centred**2, axis=(0, 1))
@@ -92,30 +77,27 @@ def temperature_friction(world: World, joints: Sequence[int], size: float) -> Ou
         j,
         {"dFv_dT": slope, "dFc_dT": -0.004 * level, "T0": 30.0, "Ts": 25.0},
         "Fv*(exp(-(T-T0)/Ts)-1)*dq + dFc_dT*(T-T0)*sign(dq)",
-        torque,
+        world.on(j, Fv * (factor - 1) * dq - 0.004 * level * warm * sign),
         uses_temperature=True,
     )
 
 
-def friction_drift(world: World, joints: Sequence[int], size: float) -> Outcome:
+def friction_drift(world: World, j: list[int], size: float) -> Outcome:
     """Friction that decays with the time since the start of the session."""
-    j = list(joints)
     t = (world.time - world.time[0, 0])[..., None]
     constant = 0.5 * float(t.max())
     decay = np.exp(-t / constant)
     level = 1.5 * size * world.scale[j]
     dq, sign = world.motion.dq[..., j], world.sign[..., j]
     Fv = level / np.maximum(rms(dq), 1e-12)
-    torque = world.zeros()
-    torque[..., j] = (Fv * dq + 0.5 * level * sign) * decay
+    torque = world.on(j, (Fv * dq + 0.5 * level * sign) * decay)
     parameters = {"dFv": -Fv, "dFc": -0.5 * level, "time_constant": constant}
     formula = "-(dFv*dq + dFc*sign(dq))*exp(-t/time_constant)"
     return Outcome(j, parameters, formula, torque)
 
 
-def position_dependent_friction(world: World, joints: Sequence[int], size: float) -> Outcome:
+def position_dependent_friction(world: World, j: list[int], size: float) -> Outcome:
     """Dry friction whose level varies with the joint's own position."""
-    j = list(joints)
     n = world.rng.choice([1.0, 2.0], len(j)) / world.unit[j]
     phase = world.rng.uniform(-np.pi, np.pi, len(j))
     form = np.cos(n * world.motion.q[..., j] - phase) * world.sign[..., j]
@@ -124,24 +106,23 @@ def position_dependent_friction(world: World, joints: Sequence[int], size: float
     return Outcome(j, parameters, "A*cos(n*q-phase)*sign(dq)", torque)
 
 
-def coupled_friction(world: World, joints: Sequence[int], size: float) -> Outcome:
+def coupled_friction(world: World, j: list[int], size: float) -> Outcome:
     """Friction between two joints whose relative motion is dq_i + r dq_j."""
-    i, k = joints
+    i, k = j
     ratio = 1.0
     rate = world.motion.dq[..., i] + ratio * world.motion.dq[..., k]
     sign = world.dry_sign(world.fine.q[..., i] + ratio * world.fine.q[..., k])
     level = size * float(np.sqrt(world.scale[i] * world.scale[k]))
     Fc, Fv = 0.7 * level, 0.7 * level / max(float(np.sqrt(np.mean(rate**2))), 1e-12)
     force = Fc * sign + Fv * rate
-    torque = world.zeros()
-    torque[..., i], torque[..., k] = force, ratio * force
+    torque = world.on([i, k], np.stack([force, ratio * force], axis=-1))
     formula = "w=dq_i+ratio*dq_j; tau_i=Fc*sign(w)+Fv*w, tau_j=ratio*tau_i"
     return Outcome([i, k], {"Fc": Fc, "Fv": Fv, "ratio": ratio}, formula, torque)
 
 
-def cross_drag(world: World, joints: Sequence[int], size: float) -> Outcome:
+def cross_drag(world: World, j: list[int], size: float) -> Outcome:
     """Unknown: drag of one joint that grows with the speed of another."""
-    i, k = joints
+    i, k = j
     dq = world.motion.dq
     c, torque = scaled(world, [i], (dq[..., i] * np.abs(dq[..., k]))[..., None], size)
     return Outcome(
@@ -153,9 +134,9 @@ def cross_drag(world: World, joints: Sequence[int], size: float) -> Outcome:
     )
 
 
-def pose_dependent_friction(world: World, joints: Sequence[int], size: float) -> Outcome:
+def pose_dependent_friction(world: World, j: list[int], size: float) -> Outcome:
     """Unknown: dry friction of one joint that depends on the position of another."""
-    i, k = joints
+    i, k = j
     form = np.sin(world.motion.q[..., k] / world.unit[k]) * world.sign[..., i]
     a, torque = scaled(world, [i], form[..., None], size)
     return Outcome(

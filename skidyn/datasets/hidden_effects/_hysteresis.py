@@ -6,22 +6,19 @@ All three replace the usual dry friction of the joint.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
 
+from skidyn._signals import Array
 from skidyn.datasets.hidden_effects._world import Outcome, Simulate, World, relax, slip
 
-Array = NDArray[np.float64]
 #: Maxwell slip: relative thresholds and shares of the elements.
 THRESHOLDS = (0.15, 0.5, 1.2)
 SHARES = (0.35, 0.35, 0.3)
 
 
-def dahl(world: World, joints: Sequence[int], size: float) -> Outcome:
+def dahl(world: World, j: list[int], size: float) -> Outcome:
     """Dahl friction: ``dz = dq (1 - sigma0 z sign(dq) / Fc)``, torque ``sigma0 z``."""
-    j, travel, presliding, Fc = _joint_travel(world, joints, size)
+    j, travel, presliding, Fc = _joint_travel(world, j, size)
     decay = np.exp(-np.abs(travel) / presliding)
     z = relax(np.sign(travel), decay, _start(travel))
     return _outcome(
@@ -33,9 +30,9 @@ def dahl(world: World, joints: Sequence[int], size: float) -> Outcome:
     )
 
 
-def lugre(world: World, joints: Sequence[int], size: float) -> Outcome:
+def lugre(world: World, j: list[int], size: float) -> Outcome:
     """LuGre friction: bristles with a Stribeck curve and a little damping."""
-    j, travel, presliding, Fc = _joint_travel(world, joints, size)
+    j, travel, presliding, Fc = _joint_travel(world, j, size)
     vs = world.rng.uniform(0.08, 0.14, len(j)) * world.unit[j]
     dF = 0.4 * Fc
     curve = 1 + dF / Fc * np.exp(-((travel / world.step / vs) ** 2))
@@ -50,9 +47,9 @@ def lugre(world: World, joints: Sequence[int], size: float) -> Outcome:
     )
 
 
-def maxwell_slip(world: World, joints: Sequence[int], size: float) -> Outcome:
+def maxwell_slip(world: World, j: list[int], size: float) -> Outcome:
     """Elastic-perfectly-plastic elements in parallel."""
-    j, travel, presliding, Fc = _joint_travel(world, joints, size)
+    j, travel, presliding, Fc = _joint_travel(world, j, size)
     force = sum(
         share * slip(travel / (presliding * threshold))
         for share, threshold in zip(SHARES, THRESHOLDS, strict=True)
@@ -71,10 +68,7 @@ def maxwell_slip(world: World, joints: Sequence[int], size: float) -> Outcome:
     )
 
 
-def _joint_travel(
-    world: World, joints: Sequence[int], size: float
-) -> tuple[list[int], Array, Array, Array]:
-    j = list(joints)
+def _joint_travel(world: World, j: list[int], size: float) -> tuple[list[int], Array, Array, Array]:
     presliding = world.rng.uniform(0.014, 0.026, len(j)) * world.unit[j]
     return j, np.diff(world.fine.q[..., j], axis=1), presliding, size * world.scale[j]
 
@@ -88,8 +82,7 @@ def _start(travel: Array) -> Array:
 def _outcome(
     world: World, j: list[int], fine_torque: Array, parameters: dict[str, object], formula: str
 ) -> Outcome:
-    torque = world.zeros()
-    torque[..., j] = fine_torque[:, :: world.stride][:, : world.n_samples]
+    torque = world.on(j, fine_torque[:, :: world.stride][:, : world.n_samples])
     return Outcome(j, parameters, formula, torque, replaces_coulomb=True)
 
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from skidyn._signals import Array
 
 if TYPE_CHECKING:
     from skidyn.robots import Robot
 
-Array = NDArray[np.float64]
 #: Order of the kinds of trajectories, so that even few of them differ.
 KINDS = ("medium", "fast", "slow", "point_to_point", "medium", "slow", "fast", "point_to_point")
 #: Largest speed relative to :attr:`Ranges.speed`, and base frequency in Hz, of each multi-sine.

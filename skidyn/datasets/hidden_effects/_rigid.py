@@ -3,19 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._exceptions import SkidynError
+from skidyn._signals import Array
 from skidyn.datasets.hidden_effects._friction import rms
 from skidyn.datasets.hidden_effects._world import LOADED_SHARE, Outcome, Simulate, World
+from skidyn.dynamics import inertial_vector
 
-Array = NDArray[np.float64]
 
-
-def payload(world: World, joints: Sequence[int], size: float) -> Outcome:
+def payload(world: World, j: list[int], size: float) -> Outcome:
     """An additional body fixed to the last link in some trajectories."""
     com = world.rng.uniform(-0.03, 0.03, 3) + np.array([0.0, 0.0, 0.08])
     added = np.zeros_like(world.parameters)
@@ -30,7 +27,7 @@ def payload(world: World, joints: Sequence[int], size: float) -> Outcome:
     return Outcome([world.n_joints - 1], parameters, formula, torque, variables=("trajectory",))
 
 
-def base_tilt(world: World, joints: Sequence[int], size: float) -> Outcome:
+def base_tilt(world: World, j: list[int], size: float) -> Outcome:
     """Gravity in a different direction than in the URDF."""
     tilt = np.deg2rad(float(np.clip(20 * size, 0.0, 60.0)))
     heading = world.rng.uniform(-np.pi, np.pi)
@@ -52,7 +49,7 @@ def base_tilt(world: World, joints: Sequence[int], size: float) -> Outcome:
     return Outcome(list(range(world.n_joints)), parameters, formula, torque)
 
 
-def external_wrench(world: World, joints: Sequence[int], size: float) -> Outcome:
+def external_wrench(world: World, j: list[int], size: float) -> Outcome:
     """A constant force at the last link, in base coordinates, in some trajectories."""
     direction = world.rng.standard_normal(3)
     direction /= np.linalg.norm(direction)
@@ -66,7 +63,7 @@ def external_wrench(world: World, joints: Sequence[int], size: float) -> Outcome
     return Outcome([], parameters, formula, torque, variables=("trajectory",))
 
 
-def environment_contact(world: World, joints: Sequence[int], size: float) -> Outcome:
+def environment_contact(world: World, j: list[int], size: float) -> Outcome:
     """A soft horizontal plane under the tool."""
     q = world.motion.q.reshape(-1, world.n_joints)
     position, _ = world.robot.forward_kinematics(q)
@@ -88,8 +85,7 @@ def point_body(mass: float, com: Array, radius: float) -> Array:
     """Inertial parameters of a ball about the frame origin."""
     inertia = 0.4 * mass * radius**2 * np.eye(3)
     inertia += mass * (com @ com * np.eye(3) - np.outer(com, com))
-    upper = inertia[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
-    return np.concatenate([[mass], mass * com, upper])
+    return inertial_vector(mass, mass * com, inertia)
 
 
 def _tool_torque(world: World, force: Array) -> Array:

@@ -3,30 +3,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from skidyn.datasets.hidden_effects._world import Outcome, Simulate, World
 
 
-def torque_gain(world: World, joints: Sequence[int], size: float) -> Outcome:
+def torque_gain(world: World, j: list[int], size: float) -> Outcome:
     """Logged torque too large or too small by a factor."""
     epsilon = float(0.6 * size * world.rng.choice([-1.0, 1.0]))
     parameters = {"epsilon": epsilon}
-    return Outcome(list(joints), parameters, "logged=(1+epsilon)*tau", gain=1 + epsilon)
+    return Outcome(j, parameters, "logged=(1+epsilon)*tau", gain=1 + epsilon)
 
 
-def time_delay(world: World, joints: Sequence[int], size: float) -> Outcome:
+def time_delay(world: World, j: list[int], size: float) -> Outcome:
     """Logged torque delayed relative to the positions."""
     delay = 0.08 * size
     formula = "tau_logged(t)=tau(t-delay), relative to the positions"
-    return Outcome(list(joints), {"delay": delay}, formula, delay=delay)
+    return Outcome(j, {"delay": delay}, formula, delay=delay)
 
 
-def saturation(world: World, joints: Sequence[int], size: float) -> Outcome:
+def saturation(world: World, j: list[int], size: float) -> Outcome:
     """Logged torque clipped at a limit that is often reached."""
-    j = list(joints)
     share = min(0.3 * size, 0.5)
     limit = np.quantile(np.abs(world.rigid[..., j]).reshape(-1, len(j)), 1 - share, axis=0)
     return Outcome(j, {"limit": limit}, "clip(tau, -limit, limit)", limit=limit)

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from skidyn._signals import Array
+
 #: Share of the variance of torque noise that is coloured, and its time constant in s.
 COLOURED_SHARE, TIME_CONSTANT = 0.4, 0.03
 #: Cut-off of the low-pass before a user's derivative, Hz.

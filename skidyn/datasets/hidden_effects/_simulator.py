@@ -10,9 +10,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._exceptions import SkidynError
+from skidyn._plain import plain
+from skidyn._signals import Array
 from skidyn.datasets.hidden_effects._friction import FRICTION
 from skidyn.datasets.hidden_effects._hysteresis import HYSTERESIS
 from skidyn.datasets.hidden_effects._motion import Motion, plan_motion
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
 
     from skidyn.robots import Robot
 
-Array = NDArray[np.float64]
 EffectSpec = str | Sequence[str] | Mapping[str, Mapping[str, Any] | None] | None
 
 #: All effects that can be hidden. Transmissions are first, since the others act on the motor's
@@ -280,14 +280,14 @@ def _with_motor(world: World, deflection: Array, rate: Array) -> World:
 
 def _total_torque(world: World, base: Sequence[str], outcomes: Sequence[Outcome]) -> Array:
     """True torque of the motors: rigid body, known effects and hidden effects."""
-    torque = world.rigid.copy()
+    torque, every = world.rigid.copy(), list(range(world.n_joints))
     replaced = sorted({j for o in outcomes if o.replaces_coulomb for j in o.joints})
     for kind in base:
         if kind == "rigid_body":
             continue
         if kind not in SIMULATED:
             raise SkidynError(f"base: {kind!r} cannot be simulated.")
-        known = SIMULATED[kind](world, range(world.n_joints), BASE_SIZES.get(kind, 0.1)).torque
+        known = SIMULATED[kind](world, every, BASE_SIZES.get(kind, 0.1)).torque
         assert known is not None
         if kind == "coulomb":
             known[..., replaced] = 0.0
@@ -396,14 +396,10 @@ def _bunch(
 
 def _truth(kind: str, outcome: Outcome) -> dict[str, Any]:
     """The answer of one effect in plain types."""
-    plain = {
-        name: value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
-        for name, value in outcome.parameters.items()
-    }
     return {
         "kind": "unknown" if kind.startswith("unknown") else kind,
         "joints": tuple(j + 1 for j in outcome.joints),
-        "parameters": plain,
+        "parameters": plain(outcome.parameters),
         "variables": outcome.variables,
         "formula": outcome.formula,
     }

@@ -6,20 +6,17 @@ Positions are logged on the motor side, and the link has another position.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._exceptions import SkidynError
+from skidyn._signals import Array
 from skidyn.datasets.hidden_effects._world import Outcome, Simulate, World
 
-Array = NDArray[np.float64]
 #: Natural frequency (rad/s) of the contact of the teeth, and its damping per rate of approach.
 CONTACT_FREQUENCY, CONTACT_DAMPING = 80.0, 3.0
 
 
-def joint_elasticity(world: World, joints: Sequence[int], size: float) -> Outcome:
+def joint_elasticity(world: World, j: list[int], size: float) -> Outcome:
     """Torsion spring between motor and link.
 
     A robot with elastic joints is differentially flat in its link positions [1]_: for a given
@@ -32,7 +29,6 @@ def joint_elasticity(world: World, joints: Sequence[int], size: float) -> Outcom
     """
     from scipy.interpolate import CubicSpline
 
-    j = list(joints)
     load = world.rigid[..., j]
     # a large deflection, not that of a stiff gear: 0.12 rad at the usual size of 0.25
     K = np.sqrt(np.mean(load**2, axis=(0, 1))) / (0.12 * size * world.unit[j])
@@ -50,15 +46,15 @@ def joint_elasticity(world: World, joints: Sequence[int], size: float) -> Outcom
     )
 
 
-def backlash(world: World, joints: Sequence[int], size: float) -> Outcome:
+def backlash(world: World, j: list[int], size: float) -> Outcome:
     """Play between motor and link, integrated through a stiff contact.
 
     The motor follows the planned motion; the link lags by ``delta``, which obeys
     ``M_ii delta'' = tau_rigid - tau_contact(delta, delta')`` along that motion.
     """
-    if len(joints) != 1:
+    if len(j) != 1:
         raise SkidynError("backlash is simulated on one joint; give one in joints.")
-    i = joints[0]
+    i = j[0]
     gap = float(0.04 * size * world.unit[i])
     q = world.motion.q.reshape(-1, world.n_joints)
     mass = world.robot.mass_matrix(q, parameters=world.parameters)[:, :, i]

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._signals import Array
 from skidyn.datasets.hidden_effects._motion import Motion
+from skidyn.dynamics import inertial_parts, inertial_vector
 
 if TYPE_CHECKING:
     from skidyn.robots import Robot
 
-Array = NDArray[np.float64]
 #: Travel (rad, m) over which dry friction changes its sign: less than the resolution of an encoder,
 #: so it acts as a sign that a joint at rest keeps.
 SLIP = 1e-6
@@ -28,33 +29,11 @@ LOADED_SHARE = 0.05
 class World:
     """A robot in motion, with its true parameters.
 
-    Signals have the shape (n_trajectories, n_samples, n_joints) on the clock of the log; those
-    with ``fine`` in their name are on the finer clock of the integration.
-
-    Attributes
-    ----------
-    robot : Robot
-        Nominal robot.
-    parameters : ndarray of shape (n_bodies, 10)
-        True inertial parameters.
-    motion : Motion
-        Motion of the links on the clock of the log.
-    fine : Motion
-        Motion of the motors (joint side of the gear) on the fine clock.
-    step : float, s
-        Fine time step.
-    stride : int
-        Fine steps per sample.
-    time : ndarray of shape (n_trajectories, n_samples), s
-        Clock of the session.
-    temperature : ndarray, degrees Celsius
-        Joint temperatures.
-    rigid : ndarray, N m or N
-        Torque of the rigid body.
-    scale : ndarray of shape (n_joints,), N m or N
-        Size of the torque of each joint, the unit of the effects.
-    rng : Generator
-        Source of chance for the effects.
+    Signals have the shape (n_trajectories, n_samples, n_joints) on the clock of the log. ``motion``
+    is that of the links; ``fine`` is that of the motors (joint side of the gear) on the finer clock
+    of the integration, with ``stride`` steps of ``step`` s per sample. ``time`` in s continues over
+    the session; temperatures are in degrees Celsius. ``rigid`` is the torque of the rigid body with
+    the true ``parameters``, and ``scale`` the size of that of each joint, the unit of the effects.
     """
 
     robot: Robot
@@ -115,35 +94,21 @@ class World:
         """Zero torque."""
         return np.zeros_like(self.rigid)
 
+    def on(self, j: list[int], values: Array) -> Array:
+        """Torque of some joints, zero on the others."""
+        torque = self.zeros()
+        torque[..., j] = values
+        return torque
+
 
 @dataclass
 class Outcome:
-    """Influence of an effect on a log.
+    """Influence of an effect on a log: the torque that it adds, or changes of the logged torque.
 
-    Attributes
-    ----------
-    joints : list of int
-        Joints on which it acts, from 0.
-    parameters : dict
-        True parameters in SI units; lists hold one value per joint.
-    formula : str
-        Formula of the simulated effect.
-    torque : ndarray or None
-        Torque that it adds.
-    variables : tuple of str
-        For unknown effects: the signals on which it depends.
-    gain : float
-        Factor on the logged torque of its joints.
-    delay : float, s
-        Delay of the logged torque of its joints.
-    limit : ndarray or None
-        Limit of the logged torque of its joints.
-    uses_temperature : bool
-        Whether the log contains temperatures.
-    replaces_coulomb : bool
-        Whether it replaces the usual dry friction of its joints.
-    motor : tuple of ndarray or None
-        Departure of the fine motor position and velocity from those of the links (transmissions).
+    Joints are counted from 0. ``parameters`` are the true ones in SI units, arrays with one value
+    per joint; ``variables`` are the signals on which an unknown effect depends. ``gain``, ``delay``
+    (s) and ``limit`` change the logged torque of the joints. ``motor`` is the departure of the fine
+    position and velocity of the motors from those of the links.
     """
 
     joints: list[int]
@@ -160,7 +125,7 @@ class Outcome:
 
 
 #: An effect: world, joints from 0, size of its torque relative to the scale of each joint.
-Simulate = Callable[[World, Sequence[int], float], Outcome]
+Simulate = Callable[[World, list[int], float], Outcome]
 
 
 def slip(travel: Array) -> Array:
@@ -225,17 +190,12 @@ def true_parameters(robot: Robot, rng: np.random.Generator) -> Array:
 
 def pseudo_inertia(row: Array) -> Array:
     """4 x 4 pseudo-inertia matrix of ``(m, m c, Ixx, Ixy, Ixz, Iyy, Iyz, Izz)``."""
-    m, hx, hy, hz, xx, xy, xz, yy, yz, zz = row
-    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    P = np.empty((4, 4))
-    P[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    P[:3, 3] = P[3, :3] = hx, hy, hz
-    P[3, 3] = m
-    return P
+    mass, moment, inertia = inertial_parts(row)
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    return np.block([[second, moment[:, None]], [moment, mass]])
 
 
 def from_pseudo_inertia(P: Array) -> Array:
     """Inverse of :func:`pseudo_inertia`."""
     inertia = np.trace(P[:3, :3]) * np.eye(3) - P[:3, :3]
-    upper = inertia[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
-    return np.concatenate([[P[3, 3]], P[:3, 3], upper])
+    return inertial_vector(P[3, 3], P[:3, 3], inertia)

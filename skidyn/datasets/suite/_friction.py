@@ -3,23 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from skidyn.datasets.suite._hidden import Adds, Hidden, Maker, Moment, Setting
-
-Array = NDArray[np.float64]
-
-
-def viscous(s: Setting) -> Hidden:
-    return _lacking(s, "viscous", "Fv", s.viscous, "Fv*dq")
-
-
-def coulomb(s: Setting) -> Hidden:
-    return _lacking(s, "coulomb", "Fc", s.coulomb, "Fc*sign(dq)")
+from skidyn._signals import Array
+from skidyn.datasets.suite._hidden import Adds, Hidden, Maker, Moment, Setting, on
 
 
 def _lacking(s: Setting, kind: str, name: str, sizes: Array, formula: str) -> Hidden:
@@ -33,10 +22,7 @@ def stribeck(s: Setting) -> Hidden:
     j = s.some()
     more = s.coulomb[j] * s.rng.uniform(0.6, 1.0, len(j)) * s.strength
     speed = s.low_speed[j] * s.rng.uniform(0.06, 0.14, len(j))
-
-    def friction(m: Moment, out: Array) -> None:
-        out[j] += more * np.exp(-((m.dq[j] / speed) ** 2))
-
+    friction = on(j, lambda m: more * np.exp(-((m.dq[j] / speed) ** 2)))
     parameters = {"dF": more, "vs": speed, "delta": 2.0}
     formula = "dF*exp(-(|dq|/vs)^2)*sign(dq)"
     return Hidden("stribeck", j, parameters, formula, ("dF", "vs"), friction=friction)
@@ -46,13 +32,8 @@ def asymmetric(s: Setting) -> Hidden:
     j = s.some(2)
     slope = s.viscous[j] * s.rng.uniform(0.4, 0.6, len(j)) * s.strength
     level = s.coulomb[j] * s.rng.uniform(0.15, 0.3, len(j)) * s.strength
-
-    def torque(m: Moment, out: Array) -> None:
-        out[j] += slope * np.abs(m.dq[j])
-
-    def friction(m: Moment, out: Array) -> None:
-        out[j] += level * np.sign(m.dq[j])
-
+    torque = on(j, lambda m: slope * np.abs(m.dq[j]))
+    friction = on(j, lambda m: level * np.sign(m.dq[j]))
     parameters = {"dFv": slope, "dFc": level}
     formula = "dFv*|dq| + dFc while it moves"
     return Hidden(
@@ -80,16 +61,9 @@ def nonlinear_viscous(s: Setting) -> Hidden:
 def load_dependent(s: Setting) -> Hidden:
     j = s.some(s.n_joints)
     mu = np.minimum(0.25, s.rng.uniform(0.07, 0.12, len(j)) * s.strength)
-
-    def friction(m: Moment, out: Array) -> None:
-        out[j] += mu * np.abs(m.load[j])
-
+    friction = on(j, lambda m: mu * np.abs(m.load[j]))
     formula = "mu*|load|*sign(dq)"
     return Hidden("load_dependent_friction", j, {"mu": mu}, formula, ("mu",), friction=friction)
-
-
-def with_temperature(s: Setting) -> Hidden:
-    return _thermal(s, s.some(s.n_joints))
 
 
 def drift(s: Setting) -> Hidden:
@@ -102,13 +76,8 @@ def drift(s: Setting) -> Hidden:
 
 def _thermal(s: Setting, j: list[int]) -> Hidden:
     span, share = s.rng.uniform(14, 22) / s.strength, -s.rng.uniform(0.003, 0.006)
-
-    def damping(m: Moment, out: Array) -> None:
-        out[j] += s.viscous[j] * (np.exp(-(m.temperature[j] - 30) / span) - 1)
-
-    def friction(m: Moment, out: Array) -> None:
-        out[j] += s.coulomb[j] * share * (m.temperature[j] - 30)
-
+    damping = on(j, lambda m: s.viscous[j] * (np.exp(-(m.temperature[j] - 30) / span) - 1))
+    friction = on(j, lambda m: s.coulomb[j] * share * (m.temperature[j] - 30))
     parameters = {"Ts": span, "T0": 30.0, "dFv_dT": -s.viscous[j] / span}
     parameters["dFc_dT"] = share * s.coulomb[j]
     return Hidden(
@@ -127,10 +96,7 @@ def by_position(s: Setting) -> Hidden:
     j = s.some(2, s.revolute)
     size = s.coulomb[j] * s.rng.uniform(0.5, 0.75, len(j)) * min(s.strength, 1.25)
     order, phase = s.rng.choice([1, 2], len(j)), s.rng.uniform(-np.pi, np.pi, len(j))
-
-    def friction(m: Moment, out: Array) -> None:
-        out[j] += size * np.cos(order * m.q[j] - phase)
-
+    friction = on(j, lambda m: size * np.cos(order * m.q[j] - phase))
     parameters = {"A": size, "n": order, "phase": phase}
     formula = "A*cos(n*q-phase)*sign(dq)"
     return Hidden("position_dependent_friction", j, parameters, formula, ("A",), friction=friction)
@@ -156,9 +122,6 @@ def dahl(s: Setting) -> Hidden:
     travel = s.low_speed[j] * s.rng.uniform(0.015, 0.04, len(j)) * s.strength
     level, state = s.coulomb[j], np.zeros(len(j))
 
-    def start() -> None:
-        state[:] = 0
-
     def torque(m: Moment, out: Array) -> None:
         v = m.dq[j]
         goal = np.sign(v)
@@ -167,7 +130,7 @@ def dahl(s: Setting) -> Hidden:
 
     parameters = {"sigma0": level / travel, "presliding": travel}
     formula = "Fc*z - Fc*sign(dq), dz=dq/presliding*(1-z*sign(dq))"
-    return _with_memory("dahl", j, parameters, formula, start, torque)
+    return _with_memory("dahl", j, parameters, formula, state, torque)
 
 
 def lugre(s: Setting) -> Hidden:
@@ -179,9 +142,6 @@ def lugre(s: Setting) -> Hidden:
     damp = 0.15 * np.sqrt(stiff * np.maximum(s.inertia[j], 0.02))
     state = np.zeros(len(j))
 
-    def start() -> None:
-        state[:] = 0
-
     def torque(m: Moment, out: Array) -> None:
         v = m.dq[j]
         g = level + more * np.exp(-((v / speed) ** 2))
@@ -192,7 +152,7 @@ def lugre(s: Setting) -> Hidden:
 
     parameters = {"sigma0": stiff, "sigma1": damp, "dF": more, "vs": speed, "presliding": travel}
     formula = "sigma0*z+sigma1*dz-Fc*sign(dq), dz=dq-sigma0*|dq|*z/g, g=Fc+dF*exp(-(dq/vs)^2)"
-    return _with_memory("lugre", j, parameters, formula, start, torque)
+    return _with_memory("lugre", j, parameters, formula, state, torque)
 
 
 def maxwell_slip(s: Setting) -> Hidden:
@@ -202,16 +162,13 @@ def maxwell_slip(s: Setting) -> Hidden:
     limit = travel[:, None] * np.array([0.15, 0.5, 1.2, 2.5])
     level, state = s.coulomb[j], np.zeros((len(j), 4))
 
-    def start() -> None:
-        state[:] = 0
-
     def torque(m: Moment, out: Array) -> None:
         state[:] = np.clip(state + (m.dq[j] * m.step)[:, None], -limit, limit)
         out[j] += level * (state / limit @ weights)
 
     parameters = {"presliding": travel, "elements": 4}
     formula = "four elastic-plastic elements in parallel - Fc*sign(dq)"
-    return _with_memory("maxwell_slip", j, parameters, formula, start, torque)
+    return _with_memory("maxwell_slip", j, parameters, formula, state, torque)
 
 
 def _with_memory(
@@ -219,7 +176,7 @@ def _with_memory(
     j: list[int],
     parameters: dict[str, Any],
     formula: str,
-    start: Callable[[], None],
+    state: Array,
     torque: Adds,
 ) -> Hidden:
     family = tuple(sorted({"dahl", "lugre", "maxwell_slip"} - {kind}))
@@ -231,14 +188,14 @@ def _with_memory(
         ("presliding",),
         accept=family,
         replaces_coulomb=True,
-        start=start,
+        start=lambda: state.fill(0.0),
         torque=torque,
     )
 
 
 FRICTION: dict[str, Maker] = {
     "asymmetric_friction": asymmetric,
-    "coulomb": coulomb,
+    "coulomb": lambda s: _lacking(s, "coulomb", "Fc", s.coulomb, "Fc*sign(dq)"),
     "coupled_friction": coupled,
     "dahl": dahl,
     "friction_drift": drift,
@@ -248,6 +205,6 @@ FRICTION: dict[str, Maker] = {
     "nonlinear_viscous": nonlinear_viscous,
     "position_dependent_friction": by_position,
     "stribeck": stribeck,
-    "temperature_friction": with_temperature,
-    "viscous": viscous,
+    "temperature_friction": lambda s: _thermal(s, s.some(s.n_joints)),
+    "viscous": lambda s: _lacking(s, "viscous", "Fv", s.viscous, "Fv*dq"),
 }

@@ -8,11 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._plain import plain
-
-Array = NDArray[np.float64]
+from skidyn._signals import Array
 
 
 @dataclass
@@ -114,6 +112,15 @@ class Moment:
 
 #: Adds to an array of shape (n_joints,): resisting torque, friction level or damping.
 Adds = Callable[[Moment, Array], None]
+
+
+def on(j: int | list[int], value: Callable[[Moment], Any]) -> Adds:
+    """Adds a value to the entries of one or several joints."""
+
+    def add(m: Moment, out: Array) -> None:
+        out[j] += value(m)
+
+    return add
 
 
 @dataclass

@@ -4,11 +4,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from skidyn.datasets.suite._hidden import Hidden, Maker, Moment, Setting
-
-Array = NDArray[np.float64]
+from skidyn._signals import Array
+from skidyn.datasets.suite._hidden import Hidden, Maker, Moment, Setting, on
 
 
 def offset(s: Setting) -> Hidden:
@@ -67,10 +65,7 @@ def torque_ripple(s: Setting) -> Hidden:
     share = s.rng.uniform(0.22, 0.4, len(j)) * s.strength
     size = share * s.coulomb[j] + 0.015 * s.torque[j]
     phase = s.rng.uniform(-np.pi, np.pi, len(j))
-
-    def torque(m: Moment, out: Array) -> None:
-        out[j] += size * np.sin(order * m.q[j] - phase)
-
+    torque = on(j, lambda m: size * np.sin(order * m.q[j] - phase))
     parameters = {"A": size, "N": order, "phase": phase}
     return Hidden("torque_ripple", j, parameters, "A*sin(N*q-phase)", ("N",), torque=torque)
 
@@ -92,10 +87,6 @@ def temperature_offset(s: Setting) -> Hidden:
         log=log,
         needs_temperature=True,
     )
-
-
-def external_wrench(s: Setting) -> Hidden:
-    return wrench_in(s, s.recordings(min(3, s.n_trajectories - 1)))
 
 
 def wrench_in(s: Setting, trajectories: list[int]) -> Hidden:
@@ -141,7 +132,7 @@ def environment_contact(s: Setting) -> Hidden:
 
 MEASUREMENT: dict[str, Maker] = {
     "environment_contact": environment_contact,
-    "external_wrench": external_wrench,
+    "external_wrench": lambda s: wrench_in(s, s.recordings(min(3, s.n_trajectories - 1))),
     "offset": offset,
     "saturation": saturation,
     "temperature_offset": temperature_offset,

@@ -6,11 +6,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidyn._signals import Array
 from skidyn.datasets.suite._robots import Drives
 
-Array = NDArray[np.float64]
 #: Time in s of shape (n,) to position, velocity and acceleration of shape (n, n_joints).
 Motion = Callable[[Array], tuple[Array, Array, Array]]
 

@@ -9,11 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from skidyn.datasets.suite._hidden import Hidden, Maker, Moment, Setting
-
-Array = NDArray[np.float64]
+from skidyn._signals import Array
+from skidyn.datasets.suite._hidden import Hidden, Maker, Moment, Setting, on
 
 
 def _nameless(
@@ -29,10 +27,7 @@ def _x(s: Setting, m: Moment, j: int) -> float:
 def product_of_positions(s: Setting) -> Hidden:
     i, k = s.pick(2)
     a = 0.5 * s.torque[i] * s.strength
-
-    def torque(m: Moment, out: Array) -> None:
-        out[i] += a * _x(s, m, i) * _x(s, m, k)
-
+    torque = on(i, lambda m: a * _x(s, m, i) * _x(s, m, k))
     formula = f"a*x{i + 1}*x{k + 1}"
     return _nameless(s, [i], {"a": a}, formula, f"q{i + 1}", f"q{k + 1}", torque=torque)
 
@@ -40,10 +35,7 @@ def product_of_positions(s: Setting) -> Hidden:
 def sum_of_positions(s: Setting) -> Hidden:
     j = s.pick(3)
     a = 0.35 * s.torque[j[0]] * s.strength
-
-    def torque(m: Moment, out: Array) -> None:
-        out[j[0]] += a * np.tanh(1.5 * sum(_x(s, m, k) for k in j))
-
+    torque = on(j[0], lambda m: a * np.tanh(1.5 * sum(_x(s, m, k) for k in j)))
     formula = "a*tanh(1.5*(" + "+".join(f"x{k + 1}" for k in j) + "))"
     return _nameless(s, j[:1], {"a": a}, formula, *(f"q{k + 1}" for k in j), torque=torque)
 
@@ -65,10 +57,7 @@ def one_cause_on_three(s: Setting) -> Hidden:
     j = s.pick(3)
     ratio = np.array([1.0, -0.7, 0.6])[: len(j)]
     a = 0.3 * s.torque[j] * s.strength * ratio
-
-    def torque(m: Moment, out: Array) -> None:
-        out[j] += a * np.tanh(3 * _x(s, m, j[0]))
-
+    torque = on(j, lambda m: a * np.tanh(3 * _x(s, m, j[0])))
     formula = f"a_k*tanh(3*x{j[0] + 1})"
     return _nameless(s, j, {"a": a}, formula, f"q{j[0] + 1}", torque=torque)
 
@@ -77,10 +66,7 @@ def narrow_bump(s: Setting) -> Hidden:
     i = s.pick(1)[0]
     at, width = s.quantile(i, s.rng.uniform(0.25, 0.75)), s.stroke[i] * s.rng.uniform(0.04, 0.09)
     a = 0.6 * s.torque[i] * s.strength * s.sign()
-
-    def torque(m: Moment, out: Array) -> None:
-        out[i] += a * np.exp(-(((m.q[i] - at) / width) ** 2))
-
+    torque = on(i, lambda m: a * np.exp(-(((m.q[i] - at) / width) ** 2)))
     parameters = {"a": a, "q0": at, "w": width}
     return _nameless(s, [i], parameters, "a*exp(-((q-q0)/w)^2)", f"q{i + 1}", torque=torque)
 
@@ -88,10 +74,7 @@ def narrow_bump(s: Setting) -> Hidden:
 def drag_by_other_speed(s: Setting) -> Hidden:
     i, k = s.pick(2)
     c = 1.2 * s.viscous[i] * s.strength / s.speed[k]
-
-    def torque(m: Moment, out: Array) -> None:
-        out[i] += c * m.dq[i] * abs(m.dq[k])
-
+    torque = on(i, lambda m: c * m.dq[i] * abs(m.dq[k]))
     formula = f"c*dq{i + 1}*|dq{k + 1}|"
     return _nameless(s, [i], {"c": c}, formula, f"dq{i + 1}", f"dq{k + 1}", torque=torque)
 
@@ -99,10 +82,7 @@ def drag_by_other_speed(s: Setting) -> Hidden:
 def friction_by_other_position(s: Setting) -> Hidden:
     i, k = s.pick(2)
     a = 0.8 * s.coulomb[i] * min(s.strength, 1.2)
-
-    def friction(m: Moment, out: Array) -> None:
-        out[i] += a * np.sin(2 * _x(s, m, k))
-
+    friction = on(i, lambda m: a * np.sin(2 * _x(s, m, k)))
     formula = f"a*sin(2*x{k + 1})*sign(dq{i + 1})"
     return _nameless(s, [i], {"a": a}, formula, f"q{k + 1}", f"dq{i + 1}", friction=friction)
 
@@ -110,10 +90,7 @@ def friction_by_other_position(s: Setting) -> Hidden:
 def friction_by_other_load(s: Setting) -> Hidden:
     i, k = s.pick(2)
     mu = 0.9 * s.coulomb[i] * s.strength / s.torque[k]
-
-    def friction(m: Moment, out: Array) -> None:
-        out[i] += min(mu * abs(m.load[k]), 3 * s.coulomb[i])
-
+    friction = on(i, lambda m: min(mu * abs(m.load[k]), 3 * s.coulomb[i]))
     return _nameless(s, [i], {"mu": mu}, f"mu*|load {k + 1}|*sign(dq{i + 1})", friction=friction)
 
 
@@ -150,10 +127,7 @@ def since_reversal(s: Setting) -> Hidden:
 def since_start(s: Setting) -> Hidden:
     i = s.pick(1)[0]
     a, fade = 0.35 * s.torque[i] * s.strength, s.duration * s.rng.uniform(0.12, 0.3)
-
-    def torque(m: Moment, out: Array) -> None:
-        out[i] += a * np.exp(-max(m.since, 0.0) / fade)
-
+    torque = on(i, lambda m: a * np.exp(-max(m.since, 0.0) / fade))
     formula = "a*exp(-t/tau), t since the trajectory's start"
     return _nameless(s, [i], {"a": a, "tau": fade}, formula, "time", torque=torque)
 
@@ -162,10 +136,7 @@ def square_on_the_clock(s: Setting) -> Hidden:
     j = s.some(2)
     rate, phase = float(np.exp(s.rng.uniform(*np.log([0.4, 6.0])))), s.rng.uniform()
     a = 0.15 * s.torque[j] * s.strength
-
-    def torque(m: Moment, out: Array) -> None:
-        out[j] += a if (m.clock * rate + phase) % 1 < 0.5 else -a
-
+    torque = on(j, lambda m: a if (m.clock * rate + phase) % 1 < 0.5 else -a)
     parameters = {"a": a, "frequency": rate}
     return _nameless(s, j, parameters, "a*square(frequency*time)", "time", torque=torque)
 
@@ -195,10 +166,7 @@ def pushes(s: Setting) -> Hidden:
 def drags_for_a_while(s: Setting) -> Hidden:
     i, when = s.pick(1)[0], s.intervals((0.5, 1.2), 0.5, 2)
     a = s.coulomb[i] * s.rng.uniform(0.8, 1.2) * s.strength
-
-    def friction(m: Moment, out: Array) -> None:
-        out[i] += a * any(b <= m.since <= e for b, e in when.get(m.trajectory, ()))
-
+    friction = on(i, lambda m: a * any(b <= m.since <= e for b, e in when.get(m.trajectory, ())))
     return _nameless(
         s, [i], {"a": a, "when": when}, "a*sign(dq) in some seconds", friction=friction
     )

@@ -3,14 +3,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from skidyn._signals import Array
 from skidyn.datasets.suite._hidden import Hidden, Maker, Moment, Setting
 from skidyn.datasets.suite._measurement import wrench_in
 from skidyn.datasets.suite._structure import payload_in, spring_on
-
-Array = NDArray[np.float64]
 
 
 def _friction_once(s: Setting) -> Hidden:

@@ -7,15 +7,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidyn._optional import import_optional
+from skidyn._signals import Array
 from skidyn.datasets.suite._robots import urdf_of
 
 if TYPE_CHECKING:
     from skidyn.datasets.suite._hidden import Hidden
 
-Array = NDArray[np.float64]
 #: Step of the integration, s.
 STEP = 5e-4
 

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidyn._signals import Array
 from skidyn.datasets.suite._hidden import Hidden
 from skidyn.datasets.suite._plant import STEP, rigid_columns
 from skidyn.datasets.suite._simulate import Recording
 
-Array = NDArray[np.float64]
 #: Torque noise relative to the largest torque; share of it that is coloured, and its time in s.
 LEVEL = {"low": (0.004, 0.007), "high": (0.018, 0.028)}
 COLOURED, COLOUR_TIME = {"low": 0.0, "high": 0.4}, 0.03

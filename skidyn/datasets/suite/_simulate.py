@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidyn._signals import Array
 from skidyn.datasets.suite._hidden import Hidden, Moment, Setting
 from skidyn.datasets.suite._motion import SETTLE, Motion
 from skidyn.datasets.suite._plant import STEP, engine, inertia_matrix, inverse, plant, rigid_model
 
-Array = NDArray[np.float64]
 #: Bandwidth of the tracking controller in rad/s and its damping.
 BANDWIDTH, DAMPING = 2 * np.pi * 9, 0.75
 #: Steps between updates of feed-forward, of gains and of temperatures.

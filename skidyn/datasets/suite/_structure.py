@@ -4,11 +4,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from skidyn.datasets.suite._hidden import Hidden, Maker, Moment, Setting
-
-Array = NDArray[np.float64]
+from skidyn._signals import Array
+from skidyn.datasets.suite._hidden import Hidden, Maker, Setting, on
 
 
 def rotor_inertia(s: Setting) -> Hidden:
@@ -35,10 +33,6 @@ def coupled_inertia(s: Setting) -> Hidden:
         ("Ia",),
         tendon={"ratios": (1.0, ratio), "inertia": inertia},
     )
-
-
-def payload(s: Setting) -> Hidden:
-    return payload_in(s, s.recordings(max(2, s.n_trajectories // 2)))
 
 
 def payload_in(s: Setting, trajectories: list[int]) -> Hidden:
@@ -73,17 +67,10 @@ def base_tilt(s: Setting) -> Hidden:
     )
 
 
-def spring(s: Setting) -> Hidden:
-    return spring_on(s, s.some(2))
-
-
 def spring_on(s: Setting, j: list[int]) -> Hidden:
     k = s.torque[j] * s.rng.uniform(0.25, 0.45, len(j)) * s.strength / s.stroke[j]
     rest = s.centre[j] + s.stroke[j] * s.rng.uniform(-0.4, 0.4, len(j))
-
-    def torque(m: Moment, out: Array) -> None:
-        out[j] += k * (m.q[j] - rest)
-
+    torque = on(j, lambda m: k * (m.q[j] - rest))
     return Hidden("spring", j, {"k": k, "q0": rest}, "k*(q-q0)", ("k",), torque=torque)
 
 
@@ -91,10 +78,7 @@ def nonlinear_spring(s: Setting) -> Hidden:
     j = s.some(2)
     k = s.torque[j] * s.rng.uniform(0.5, 0.9, len(j)) * s.strength / s.stroke[j] ** 3
     rest = s.centre[j] + s.stroke[j] * s.rng.uniform(-0.25, 0.25, len(j))
-
-    def torque(m: Moment, out: Array) -> None:
-        out[j] += k * (m.q[j] - rest) ** 3
-
+    torque = on(j, lambda m: k * (m.q[j] - rest) ** 3)
     return Hidden(
         "nonlinear_spring", j, {"k3": k, "q0": rest}, "k3*(q-q0)^3", ("k3",), torque=torque
     )
@@ -112,10 +96,7 @@ def gravity_compensator(s: Setting) -> Hidden:
 
     reach = shape(s.centre[j[0]] + s.stroke[j[0]] * np.linspace(-1, 1, 50))
     k = s.torque[j[0]] * s.rng.uniform(0.6, 1.0) * s.strength / np.ptp(reach)
-
-    def torque(m: Moment, out: Array) -> None:
-        out[j] += k * shape(m.q[j])
-
+    torque = on(j, lambda m: k * shape(m.q[j]))
     return Hidden(
         "gravity_compensator",
         j,
@@ -176,10 +157,7 @@ def end_stop(s: Setting) -> Hidden:
     limit = np.array([s.quantile(i, 0.88 if d > 0 else 0.12) for i, d in zip(j, side, strict=True)])
     last = np.array([s.quantile(i, 1.0 if d > 0 else 0.0) for i, d in zip(j, side, strict=True)])
     k = s.torque[j] * s.rng.uniform(0.7, 1.1, len(j)) * s.strength / np.abs(last - limit)
-
-    def torque(m: Moment, out: Array) -> None:
-        out[j] += side * k * np.maximum(0, side * (m.q[j] - limit))
-
+    torque = on(j, lambda m: side * k * np.maximum(0, side * (m.q[j] - limit)))
     return Hidden(
         "end_stop",
         j,
@@ -199,7 +177,7 @@ STRUCTURE: dict[str, Maker] = {
     "gravity_compensator": gravity_compensator,
     "joint_elasticity": joint_elasticity,
     "nonlinear_spring": nonlinear_spring,
-    "payload": payload,
+    "payload": lambda s: payload_in(s, s.recordings(max(2, s.n_trajectories // 2))),
     "rotor_inertia": rotor_inertia,
-    "spring": spring,
+    "spring": lambda s: spring_on(s, s.some(2)),
 }
