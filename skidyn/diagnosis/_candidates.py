@@ -139,6 +139,19 @@ def rows_within(
     }
 
 
+def side_by_side(blocks: Sequence[Array]) -> Array:
+    """All columns of some blocks, one after the other, shape (n_columns, n_rows).
+
+    Many narrow blocks are copied several times faster so than next to each other.
+
+    Parameters
+    ----------
+    blocks : sequence of ndarray of shape (n_rows, k)
+        Blocks of columns.
+    """
+    return np.concatenate([block.T for block in blocks])
+
+
 def catalogue_candidates(
     problem: Problem, kinds: Iterable[str], size_share: float = 0.0
 ) -> list[Candidate]:

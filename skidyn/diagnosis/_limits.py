@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from skidyn._cores import each
 from skidyn._signals import Array
 from skidyn._text import inside
 from skidyn.diagnosis._candidates import Candidate
@@ -172,27 +174,29 @@ def find_limits(
     gram = gram_of(felt, width)
     model = Normal(gram, np.zeros(len(gram)), column_sizes(gram))
     power = [float(np.sum(t**2)) / s**2 for t, s in zip(problem.target, sigma, strict=True)]
+    span = np.ptp(problem.torque, axis=0)
 
     @cache
     def needed(joint: int, count: int, free: int) -> float:
         return gates.needed(joint, count, float(inflation[joint]), free)
 
-    largest: dict[tuple[str, int], list[tuple[Candidate, float]]] = {}
-    for candidate in candidates:
-        effect = candidate.term.effect
-        share = effect.coefficients[0].is_share
-        if len(candidate.joints) != 1 or effect.nameless or share:
-            continue
-        joint = candidate.joints[0]
+    def told(candidate: Candidate) -> float:
+        (joint,) = candidate.joints
         own, swept, column = _information(candidate, felt, width, sigma, model)
         free = max(1, round(gates.acting(joint, column)))
         least = needed(joint, candidate.width + candidate.n_shapes, free)
         size = least / np.sqrt(swept) if swept > NEW_SHARE * own else np.inf
         # A size larger than the whole torque is not a limit, nor a torque beyond its range, of
         # which the motion contains a negligible part.
-        beyond = effect.coefficients[0].unit == "N m" and size > np.ptp(problem.torque[:, joint])
-        told = size if size**2 * own < power[joint] and not beyond else np.inf
-        largest.setdefault((effect.kind, joint), []).append((candidate, float(told)))
+        unit = candidate.term.effect.coefficients[0].unit
+        beyond = unit == "N m" and size > span[joint]
+        return float(size if size**2 * own < power[joint] and not beyond else np.inf)
+
+    single = [c for c in candidates if len(c.joints) == 1 and not c.term.effect.nameless]
+    single = [c for c in single if not c.term.effect.coefficients[0].is_share]
+    largest: dict[tuple[str, int], list[tuple[Candidate, float]]] = defaultdict(list)
+    for candidate, size in zip(single, each(told, single), strict=True):
+        largest[candidate.term.kind, candidate.joints[0]].append((candidate, size))
     limits = [_limit(problem, joint, tried) for (_, joint), tried in largest.items()]
     return sorted([*limits, *_not_shown(problem)], key=lambda limit: (limit.joint, limit.kind))
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from skidyn._cores import each
 from skidyn._signals import Array
-from skidyn.diagnosis._candidates import Candidate
+from skidyn.diagnosis._candidates import Candidate, side_by_side
 from skidyn.diagnosis._held_out import told_alone
 from skidyn.diagnosis._profile import QUARTERS
 from skidyn.evidence import (
@@ -201,15 +201,15 @@ class Screen:
         target = np.zeros((n_folds, len(pick) * k))
         cross = np.zeros((*model.cross.shape, len(pick) * k))
         for j in group.joints:
-            rows = [self.candidates[i].rows[j] for i in group.index[pick]]
-            block = np.hstack(rows)
-            block /= self.sigma[j]
+            columns = side_by_side([self.candidates[i].rows[j] for i in group.index[pick]])
+            columns /= self.sigma[j]
             felt = model.felt[j]
             for f, here in enumerate(self.folds[j]):
-                part = block[here]
-                own[f] += _products(part[None], part[None], k)[0]
-                target[f] += self.target[j][here] @ part
-                cross[f, felt.places] += felt.rows[here].T @ part
+                part = columns[:, here]
+                apart = part.reshape(len(pick), k, -1)
+                own[f] += apart @ apart.transpose(0, 2, 1)
+                target[f] += part @ self.target[j][here]
+                cross[f, felt.places] += felt.rows[here].T @ part.T
         return _Columns(cross, own, target)
 
     def _in_parts(self, wanted: NDArray[np.bool_] | None) -> Iterator[list[_Wanted]]:

@@ -20,7 +20,7 @@ from skidyn.diagnosis._candidates import Candidate, rows_within
 from skidyn.diagnosis._confidence import SEPARATES
 from skidyn.diagnosis._profile import QUARTERS
 from skidyn.effects import Term, get_effect
-from skidyn.evidence import Felt, Problem, column_sizes, felt_columns, left_out_errors
+from skidyn.evidence import Problem, column_sizes, felt_columns, left_out_errors
 
 #: Number of largest gaps between the sorted estimates that are tried as the border of the split.
 CUTS = 3
@@ -78,7 +78,7 @@ def split_effects(
         return []
     y = [t / s for t, s in zip(target, sigma, strict=True)]
     joints = tuple(range(problem.n_joints))
-    model = felt_columns(problem, blocks, sigma)
+    model = _Model.of(problem, blocks, sigma, y)
     found = []
     for kind in kinds:
         effect = get_effect(kind)
@@ -92,7 +92,7 @@ def split_effects(
         for shape in [*usual, *effect.elsewhere(problem.few)]:
             term = Term.at(kind, joints, shape)
             rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
-            products = _Products.of(problem, model, y, rows, names)
+            products = model.with_effect(rows)
             splits = _best_splits(problem, term, products, names, free)
             if shape in usual:
                 most = max([most, *(float(split.drop.sum()) for split in splits)])
@@ -151,10 +151,10 @@ def _best_splits(
     """The best split for the same effect in its trajectories, and that for separate sizes."""
     own = products.own_estimates(term.effect.leading or term.width, free)
     groups = _splits(term.effect.grows, own, names[free])
-    alone = {name: products.drop(names == name) for name in {n for g in groups for n in g}}
     together = [(products.drop(np.isin(names, group)), group) for group in groups]
     # Separate sizes in most recordings can be due to any missing slow torque.
     few = [group for group in groups if 3 * len(group) <= 2 * len(names)]
+    alone = {name: products.drop(names == name) for name in {n for g in few for n in g}}
     apart = [(np.sum([alone[name] for name in group], axis=0), group) for group in few]
     found = []
     for drops, is_apart in ((together, False), (apart, True)):
@@ -179,6 +179,67 @@ def recordings_with(
 
 
 @dataclass(frozen=True)
+class _Model:
+    """The model without an effect, which all effects share.
+
+    Attributes
+    ----------
+    places : list of ndarray of shape (n_columns_j + 1,)
+        Places of [columns that act on the joint | torque] among all of the model, by joint.
+    cells : list of dict of (int, int) to (ndarray of int, ndarray)
+        Rows of every trajectory and quarter, and these columns there, by joint.
+    n_trajectories : int
+        Number of trajectories.
+    gram : ndarray of shape (4, p + 1, p + 1)
+        Products of [model | torque] by quarter.
+    """
+
+    places: list[NDArray[np.int64]]
+    cells: list[dict[tuple[int, int], tuple[NDArray[np.intp], Array]]]
+    n_trajectories: int
+    gram: Array
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        blocks: Sequence[dict[int, Array]],
+        sigma: Array,
+        y: Sequence[Array],
+    ) -> _Model:
+        felt, p = felt_columns(problem, blocks, sigma)
+        names = problem.rows.recordings
+        places = [np.append(own.places, p) for own in felt]
+        cells, gram = [], np.zeros((QUARTERS, p + 1, p + 1))
+        for j, (own, torque, place) in enumerate(zip(felt, y, places, strict=True)):
+            both, quarter = np.column_stack([own.rows, torque]), problem.rows.quarter[j]
+            for f in range(QUARTERS):
+                part = both[quarter == f]
+                gram[f][np.ix_(place, place)] += part.T @ part
+            cell = np.searchsorted(names, problem.rows.trajectory[j]) * QUARTERS + quarter
+            inside = {c: np.flatnonzero(cell == c) for c in np.unique(cell).tolist()}
+            cells.append({divmod(c, QUARTERS): (at, both[at]) for c, at in inside.items()})
+        return cls(places, cells, len(names), gram)
+
+    @cached_property
+    def errors(self) -> Array:
+        """Held-out squared error by quarter, (4,)."""
+        return left_out_errors(self.gram)
+
+    def with_effect(self, rows: dict[int, Array]) -> _Products:
+        """Products with the columns of an effect, by joint and in units of the noise."""
+        k = next(iter(rows.values())).shape[1]
+        cross = np.zeros((self.n_trajectories, QUARTERS, self.gram.shape[1], k))
+        own = np.zeros((self.n_trajectories, QUARTERS, k, k))
+        for j in sorted(rows):
+            for (i, f), (at, both) in self.cells[j].items():
+                block = rows[j][at]
+                cross[i, f, self.places[j]] += both.T @ block
+                own[i, f] += block.T @ block
+        return _Products(self, cross, own)
+
+
+@dataclass(frozen=True)
 class _Products:
     """Products of the model's columns, an effect's and the torque.
 
@@ -187,56 +248,24 @@ class _Products:
 
     Attributes
     ----------
-    gram : ndarray of shape (4, p + 1, p + 1)
-        Of [model | torque] by quarter.
+    model : _Model
+        The model without the effect.
     cross : ndarray of shape (n_trajectories, 4, p + 1, k)
-        With the effect, by trajectory and quarter.
+        Of [model | torque] with the effect, by trajectory and quarter.
     own : ndarray of shape (n_trajectories, 4, k, k)
         Of the effect.
     """
 
-    gram: Array
+    model: _Model
     cross: Array
     own: Array
 
-    @classmethod
-    def of(
-        cls,
-        problem: Problem,
-        model: tuple[Sequence[Felt], int],
-        y: Sequence[Array],
-        rows: dict[int, Array],
-        names: NDArray[Any],
-    ) -> _Products:
-        felt, p = model
-        k = next(iter(rows.values())).shape[1]
-        gram = np.zeros((QUARTERS, p + 1, p + 1))
-        cross = np.zeros((len(names), QUARTERS, p + 1, k))
-        own = np.zeros((len(names), QUARTERS, k, k))
-        for j, (columns, torque) in enumerate(zip(felt, y, strict=True)):
-            places = np.append(columns.places, p)
-            both = np.column_stack([columns.rows, torque])
-            quarter = problem.rows.quarter[j]
-            for f in range(QUARTERS):
-                part = both[quarter == f]
-                gram[f][np.ix_(places, places)] += part.T @ part
-            if j not in rows:
-                continue
-            cell = np.searchsorted(names, problem.rows.trajectory[j]) * QUARTERS + quarter
-            for c in np.unique(cell):
-                here = np.flatnonzero(cell == c)
-                i, f = divmod(int(c), QUARTERS)
-                block = rows[j][here]
-                cross[i, f, places] += both[here].T @ block
-                own[i, f] += block.T @ block
-        return cls(gram, cross, own)
-
     def own_estimates(self, leading: int, free: NDArray[np.bool_]) -> Array:
         """The effect's leading coefficients, estimated for the free trajectories, each its own."""
-        p, n = self.gram.shape[1] - 1, int(free.sum())
+        p, n = self.model.gram.shape[1] - 1, int(free.sum())
         size = p + leading * n
         gram, right = np.zeros((size, size)), np.zeros(size)
-        whole, cross = self.gram.sum(0), self.cross[free].sum(1)[:, :, :leading]
+        whole, cross = self.model.gram.sum(0), self.cross[free].sum(1)[:, :, :leading]
         gram[:p, :p], right[:p] = whole[:p, :p], whole[:p, p]
         gram[:p, p:] = cross[:, :p].transpose(1, 0, 2).reshape(p, -1)
         gram[p:, :p] = gram[:p, p:].T
@@ -265,25 +294,20 @@ class _Products:
 
     def drop(self, chosen: NDArray[np.bool_]) -> Array:
         """Held-out drop of squared error by quarter when chosen trajectories get the effect."""
-        return self.errors - left_out_errors(self._with_effect(chosen))
+        return self.model.errors - left_out_errors(self._with_effect(chosen))
 
     def _with_effect(self, chosen: NDArray[np.bool_]) -> Array:
         """Products of [model | effect in chosen trajectories | torque] by quarter."""
-        p, k = self.gram.shape[1] - 1, self.own.shape[2]
+        p, k = self.model.gram.shape[1] - 1, self.own.shape[2]
         place = np.append(np.arange(p), p + k)  # the torque comes last
         effect = slice(p, p + k)
         grams = np.zeros((QUARTERS, p + k + 1, p + k + 1))
-        grams[:, place[:, None], place] = self.gram
+        grams[:, place[:, None], place] = self.model.gram
         cross = self.cross[chosen].sum(0)
         grams[:, place, effect] = cross
         grams[:, effect, place] = cross.transpose(0, 2, 1)
         grams[:, effect, effect] = self.own[chosen].sum(0)
         return grams
-
-    @cached_property
-    def errors(self) -> Array:
-        """Held-out squared error of the model alone by quarter, (4,)."""
-        return left_out_errors(self.gram)
 
 
 def _splits(grows: bool, own: Array, names: NDArray[Any]) -> list[list[Any]]:
