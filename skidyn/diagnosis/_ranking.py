@@ -19,7 +19,6 @@ from skidyn.diagnosis._courses import course_candidates
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
-    grouped_by_joints,
     in_part,
     says_little,
     some_recordings,
@@ -27,10 +26,10 @@ from skidyn.diagnosis._hypothesis import (
 )
 from skidyn.diagnosis._parts import part_candidates
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
-from skidyn.diagnosis._recordings import DRIFT, FRICTION, choose, drifting, own_effects
+from skidyn.diagnosis._recording_search import RecordingSearch
+from skidyn.diagnosis._recordings import DRIFT, FRICTION, own_effects
 from skidyn.diagnosis._rule import ALL_LEFT, FEW_WAVES, MASKED, NEARLY, RESOLVED, ROUNDS
 from skidyn.diagnosis._screen import Model, Screen
-from skidyn.diagnosis._search_state import SearchState
 from skidyn.diagnosis._spans import FOLLOWS_ANY, span_candidates
 from skidyn.diagnosis._spectrum import Line, find_lines, find_vibrations
 from skidyn.diagnosis._split import recordings_with, split_effects
@@ -46,12 +45,12 @@ FORMS_TRIED = 3
 PRODUCTS = "products"
 
 
-class RankingSearch(SearchState):
+class RankingSearch(RecordingSearch):
     """A search that ranks explanations."""
 
     def rank(self) -> list[Hypothesis]:
         """Explanations of the residual, best first."""
-        screening, recordings = self._screening(), self._by_kind_of_recording()
+        screening, recordings = self._screening(), self.by_kind_of_recording()
         once = [self._lines, self._splits, self._parts, self._spans, self._courses]
         looks: list[Callable[[], Any]] = [*once, *screening, *recordings]
         text = f"{self._round}: screening effects"
@@ -61,7 +60,7 @@ class RankingSearch(SearchState):
         ranking += [self._against_functions(h, ranking) for h in lines]
         ranking += self._finals([own for of_kind in found[len(screening) :] for own in of_kind])
         ranking += self._finals(parts, refined=0)  # their shapes are refined already
-        ranking += self._finals([*spans, *courses], refined=0)
+        ranking += self._finals([*spans, *courses, *self.in_every_recording()], refined=0)
         ranking += self._other_forms(ranking)
         # The least specific explanations are last: differences between recordings, and vibration.
         return sorted(ranking, key=lambda h: (self._is_last(h, ranking), -h.score))
@@ -271,7 +270,7 @@ class RankingSearch(SearchState):
         for split in splits:
             if split.drop.sum() > 0:
                 candidate = self._carried(split.candidate)
-                own = self._with_own_sizes(candidate) if split.apart else [candidate]
+                own = self.with_own_sizes(candidate) if split.apart else [candidate]
                 found.append((own, -float(split.drop.sum()) + 2 * sum(c.width for c in own)))
         return found
 
@@ -352,29 +351,6 @@ class RankingSearch(SearchState):
         kinds = [kind for kind in self.kinds if kind not in already]
         possible = partial(self.can_be, others=self.chosen)
         return course_candidates(self.problem, kinds, tester, possible, self.significant, least)
-
-    def _with_own_sizes(self, candidate: Candidate) -> list[Candidate]:
-        """Effects of some recordings, with a common size for those that do not differ.
-
-        One by one, the two groups of recordings whose sizes differ least are joined, as long as the
-        penalty for separate sizes exceeds what these explain.
-        """
-
-        def of(group: tuple[int, ...]) -> Candidate:
-            term = candidate.term.with_shape(trajectories=group)
-            return replace(candidate, term=term, rows=self.problem.term_rows(term))
-
-        groups: list[tuple[int, ...]] = [(k,) for k in candidate.term.trajectories or ()]
-        while True:
-            own = [of(group) for group in groups]
-            if len(own) < 2:
-                return own
-            tester = self.tester([*self.chosen, *own])
-            gain, i, j = tester.least_difference(len(own), candidate.width)
-            if gain > 2 * self._price(own) * candidate.width:
-                return own
-            both = tuple(sorted(groups[i] + groups[j]))
-            groups = sorted([*(g for k, g in enumerate(groups) if k not in (i, j)), both])
 
     def _finals(self, rough: list[list[Candidate]], refined: int | None = None) -> list[Hypothesis]:
         """Compare the best kinds with re-estimated noise, the first of them with refined shapes."""
@@ -535,51 +511,3 @@ class RankingSearch(SearchState):
         if score > self.settings.ripple_share * max(h.score for h in rivals):
             return ripple
         return replace(ripple, score=min(score, ripple.score))
-
-    def _by_kind_of_recording(self) -> list[Callable[[], list[list[Candidate]]]]:
-        """Changes between recordings for each kind."""
-
-        def look(kind: str) -> list[list[Candidate]]:
-            pool = [c for c in self.by_recording if c.kind == kind]
-            chosen = choose(pool, lambda more: self.tester([*self.chosen, *more]), self.significant)
-            chosen = [
-                c
-                for c in chosen
-                if self.can_be(c, [*self.chosen, *(o for o in chosen if o is not c)])
-            ]
-            return self._same_or_own(chosen) if chosen else []
-
-        known = {c.kind for c in self.chosen if some_recordings(c)}
-        known |= set(FRICTION) if DRIFT in known else set()
-        kinds = dict.fromkeys(c.kind for c in self.by_recording)
-        return [partial(look, kind) for kind in kinds if kind not in known]
-
-    def can_be(self, candidate: Candidate, others: Sequence[Candidate]) -> bool:
-        """Whether a candidate's coefficients, together with others, are physically possible."""
-        return candidate.allows(self.tester(others).test(candidate.rows).coefficients)
-
-    def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
-        """Effects of few recordings as known effects, those of many recordings as unknown.
-
-        Separate sizes in many recordings can be due to any missing slow torque, unless the
-        remainder of the joint is white, or they explain nearly all that is missing on it.
-        """
-        most, white = self.settings.most_recordings, self.settings.white
-        few, drift, many = [], [], []
-        for part in grouped_by_joints(chosen):
-            named = len(part) <= most or self._price(part) <= white or self._leaves_little(part)
-            changes = drifting(self.problem, self.kinds, part) if named else []
-            drift += changes
-            few += part if named and not changes else []
-            many += [] if named else part
-        many = [replace(c, kind=UNKNOWN, variables=("trajectory",)) for c in many]
-        return [part for part in (few, drift, many) if part]
-
-    def _leaves_little(self, part: Sequence[Candidate]) -> bool:
-        """Whether effects that vary within recordings remove nearly all the error."""
-        if part[0].kind == "offset":
-            return False
-        tester, joints = self.tester(self.chosen), {j for c in part for j in c.joints}
-        left = tester.beside([c.rows for c in part]).residual
-        had, has = (sum(float(r[j] @ r[j]) for j in joints) for r in (tester.residual, left))
-        return has < (1 - ALL_LEFT) * had

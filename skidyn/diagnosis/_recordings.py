@@ -20,6 +20,8 @@ from skidyn.evidence import Problem
 TESTED = 8
 #: Most terms of one kind.
 MOST_TERMS = 24
+#: Fewest recordings in each of which an effect may have another size.
+FEWEST = 3
 #: Kinds of friction that may change together, and the kind of such a change.
 FRICTION, DRIFT = ("viscous", "coulomb"), "friction_drift"
 #: Share of the whole gain from which a single recording is treated alone.
@@ -100,11 +102,41 @@ def everywhere(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
     terms = terms_by_recording(problem, kinds)
     for kind in kinds:
         effect = get_effect(kind)
-        whole = effect.scope == "robot" and (effect.drifts or effect.search == "trajectories")
-        if whole and problem.robot is not None:
-            joints = tuple(range(problem.n_joints))
-            terms += [Term.at(kind, joints, shape) for shape in effect.grid(problem.few, joints)]
+        if effect.scope == "robot" and (effect.drifts or effect.search == "trajectories"):
+            terms += _of_whole_robot(problem, kind)
     return [Candidate(term.kind, term, problem.term_rows(term)) for term in terms]
+
+
+def _of_whole_robot(problem: Problem, kind: str) -> list[Term]:
+    """Terms of a kind on all joints together, in all recordings."""
+    effect, joints = get_effect(kind), tuple(range(problem.n_joints))
+    if problem.robot is None or ("time" in effect.needs and problem.signals.time is None):
+        return []
+    return [Term.at(kind, joints, shape) for shape in effect.grid(problem.few, joints)]
+
+
+def every_recording(problem: Problem, kinds: Iterable[str]) -> list[list[Candidate]]:
+    """Effects of all joints with another size in each recording.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    kinds : iterable of str
+        Kinds to try.
+    """
+    names = problem.rows.recordings.tolist()
+    if not FEWEST <= len(names) <= MOST_TERMS:
+        return []
+    found = []
+    for kind in kinds:
+        if get_effect(kind).sizes_by_recording:
+            for whole in _of_whole_robot(problem, kind)[:1]:
+                rows = problem.term_rows(whole)
+                terms = [whole.with_shape(trajectories=(name,)) for name in names]
+                own = [rows_within(problem, rows, (name,)) for name in names]
+                found.append([Candidate(kind, *pair) for pair in zip(terms, own, strict=True)])
+    return found
 
 
 def own_effects(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:

@@ -82,6 +82,9 @@ class Effect:
     drifts : bool
         Whether its size may change steadily over the log or over each recording, as for a load that
         empties or a base that sinks, and is also tested in this form.
+    sizes_by_recording : bool
+        Whether all joints may have it in another size in each recording, as a base that is moved or
+        a logger that is started by hand in between, and it is also tested in this form.
     is_exact : bool
         Whether the formula is exact for this effect, so that any residual is another effect; other
         formulas are approximations and leave a residual.
@@ -140,6 +143,7 @@ class Effect:
     grows: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
     drifts: ClassVar[bool] = False
+    sizes_by_recording: ClassVar[bool] = False
     softness: ClassVar[float] = 0.0
     drawn: ClassVar[float] = 0.0
     is_exact: ClassVar[bool] = False

@@ -36,6 +36,7 @@ class BaseTilt(Effect):
     scope = "robot"
     needs = ("robot",)
     drifts = True
+    sizes_by_recording = True
     is_exact = True
     simplicity = 12
     rivals = ("offset", "gravity_compensator")

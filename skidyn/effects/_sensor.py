@@ -68,6 +68,7 @@ class TimeDelay(Effect):
     shapes = (Shape("shift", "s", (), 0.01, LONGEST_SHIFT, scales=False),)
     forms = ({"shift": 0.04},)
     needs = ("model_torque", "time")
+    sizes_by_recording = True
     is_slow = True
     simplicity = 6
     rivals = ("joint_elasticity", "rotor_inertia", "viscous")
