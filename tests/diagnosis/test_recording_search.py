@@ -33,10 +33,14 @@ def log_of(torque_of):
         frame = pd.DataFrame({"time": TIME + 20 * name, "trajectory": name})
         frame[["q1", "q2", "dq1", "dq2"]] = np.hstack([q, dq])
         frames.append(frame)
-        torques.append(torque_of((name - 1) // 2, q, dq, ddq) + 0.2 * dq + 0.3 * np.sign(dq))
+        torques.append(torque_of((name - 1) // 2, q, dq, ddq))
     torque = np.vstack(torques)
     noise = np.random.default_rng(0).normal(size=torque.shape)
     return pd.concat(frames, ignore_index=True), torque + 0.01 * torque.std(axis=0) * noise
+
+
+def friction(dq):
+    return 0.2 * dq + 0.3 * np.sign(dq)
 
 
 def found_in(robot, X, torque):
@@ -53,7 +57,7 @@ def test_a_base_that_is_moved_between_recordings_is_tilted_in_another_way_in_eac
 
     def torque(group, q, dq, ddq):
         gravity = np.cos(angles[group]) * down + np.sin(angles[group]) * side
-        return robot.inverse_dynamics(q, dq, ddq, gravity=gravity)
+        return robot.inverse_dynamics(q, dq, ddq, gravity=gravity) + friction(dq)
 
     findings = found_in(robot, *log_of(torque))
 
@@ -68,7 +72,7 @@ def test_a_logger_that_is_started_by_hand_is_late_by_another_time_in_each_record
     robot, delays = load_planar_arm(), [0.006, 0.014, 0.022]
 
     def torque(group, q, dq, ddq):
-        exact = robot.inverse_dynamics(q, dq, ddq)
+        exact = robot.inverse_dynamics(q, dq, ddq) + friction(dq)
         columns = [np.interp(TIME - delays[group], TIME, column) for column in exact.T]
         return np.column_stack(columns)
 
