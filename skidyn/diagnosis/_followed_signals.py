@@ -31,6 +31,7 @@ from skidyn.diagnosis._signal_products import (
     by_fold,
     predictable,
     product_of_three,
+    product_with_load,
     products_of_two,
 )
 from skidyn.diagnosis._variables import average_at_rows, averaged_signals
@@ -66,12 +67,15 @@ class Followed(NamedTuple):
         which it is the best.
     changing : list of Product
         The best function of a signal with a size of its own in each recording.
+    loaded : list of Product
+        The best product of the load and a function of a signal.
     """
 
     sets: list[tuple[str, ...]]
     sums: list[Sum]
     products: list[Product]
     changing: list[Product]
+    loaded: list[Product]
 
 
 def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
@@ -96,7 +100,7 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     # numbered without gaps: dropped trajectories must not leave an empty quarter below
     numbers, fold = np.unique(problem.fold[joint][::step], return_inverse=True)
     if len(numbers) < 4:
-        return Followed([], [], [], changing)
+        return Followed([], [], [], changing, [])
     sets, products = products_of_two(signals, y, fold)
     found = [*_by_trees(signals, y, fold), *sets]
     nearest = _nearest(joint, range(problem.n_joints))
@@ -105,9 +109,17 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     if triple is not None:
         products.append(triple)
         found.append(tuple(sorted(factor.signal for factor in triple[0])))
+    loaded = []
+    if problem.robot is not None and problem.signals.load is not None:
+        load = average_at_rows(problem, joint, problem.signals.load[:, joint])[::step]
+        # friction under load is in the catalogue
+        others = {name: x for name, x in signals.items() if name != f"dq{joint + 1}"}
+        one = product_with_load(others, load, y, fold)
+        loaded = [] if one is None else [one]
     turning = np.flatnonzero(~problem.signals.prismatic).tolist()
     positions = {k: signals[f"q{k + 1}"] for k in sorted(_nearest(joint, turning))}
-    return Followed(list(dict.fromkeys(found)), _by_sums(positions, y, fold), products, changing)
+    sums = _by_sums(positions, y, fold)
+    return Followed(list(dict.fromkeys(found)), sums, products, changing, loaded)
 
 
 def _nearest(joint: int, joints: Iterable[int]) -> list[int]:

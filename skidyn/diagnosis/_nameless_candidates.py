@@ -19,6 +19,7 @@ from skidyn.effects import (
     FunctionOfSum,
     NamelessEffect,
     ProductOfSignals,
+    ProductWithLoad,
     SizeByRecording,
     Term,
     get_effect,
@@ -90,6 +91,8 @@ def _shapes(
     few = problem.few
     if isinstance(effect, ProductOfSignals):
         return [(effect.shape_of(factors), among) for factors, among in followed.products]
+    if isinstance(effect, ProductWithLoad):
+        return [(effect.shape_of(factors), among) for factors, among in followed.loaded]
     if isinstance(effect, SizeByRecording):
         names = problem.rows.recordings.tolist()
         return [(effect.shape_of(of, names), among) for (of,), among in followed.changing]

@@ -27,6 +27,8 @@ CONSTANT = 1e-10
 #: which a residual is left as noise by it.
 ROWS_OF_TRIPLES, NOISY = 1000, 1.8
 
+#: Name of the load of a joint among the functions of a product.
+LOAD = "load"
 #: Functions that are multiplied, and the number of products of which theirs was the best.
 Product = tuple[tuple[Factor, ...], int]
 
@@ -131,6 +133,37 @@ def product_of_three(
     if gain <= least or not _predicted_by([_without_mean(values[:, best].T)], y, fold):
         return None
     return tuple(factors[k] for k in best), among
+
+
+def product_with_load(
+    signals: dict[str, Array], load: Array, y: Array, fold: NDArray[np.int64]
+) -> Product | None:
+    """The best product of a function of a signal with the load of the joint, or its magnitude.
+
+    Parameters
+    ----------
+    signals : dict of str to ndarray of shape (n_rows,)
+        By name.
+    load : ndarray of shape (n_rows,)
+        Load, N m or N.
+    y : ndarray of shape (n_rows,)
+        Residual, N m or N.
+    fold : ndarray of shape (n_rows,)
+        Fold of every row, from 0.
+    """
+    factors = [f for name, x in signals.items() for f in simple_functions(name, x)]
+    loads = [Factor(LOAD, "value"), Factor(LOAD, "size")]
+    values = values_of(factors, signals)
+    columns = np.hstack([f.of(load)[:, None] * values for f in loads])
+    columns -= columns.mean(axis=0)
+    size = np.sum(columns**2, axis=0)
+    tells = size > CONSTANT * len(y) * float(load @ load / len(y))
+    gain = np.where(tells, (y @ columns) ** 2 / np.where(tells, size, 1.0), 0.0)
+    best = int(np.argmax(gain))
+    if gain[best] <= WORTH * float(y @ y) or not _predicted_by([columns[:, best]], y, fold):
+        return None
+    kind, of = divmod(best, len(factors))
+    return (loads[kind], factors[of]), columns.shape[1]
 
 
 def _best_triple(values: Array, own: NDArray[np.int64], y: Array) -> tuple[list[int], float, int]:

@@ -46,6 +46,7 @@ from skidyn.effects._nameless_periodic import ClockPeriodic as ClockPeriodic
 from skidyn.effects._nameless_products import (
     Factor as Factor,
     ProductOfSignals as ProductOfSignals,
+    ProductWithLoad as ProductWithLoad,
     SizeByRecording as SizeByRecording,
 )
 from skidyn.effects._nameless_signals import (

@@ -79,6 +79,44 @@ class ProductOfSignals(NamelessEffect):
         return product[:, None]
 
 
+class ProductWithLoad(NamelessEffect):
+    """The load of the joint, or its magnitude, times a simple function of a signal.
+
+    A transmission that loses more while another joint moves, or a supply that sags.
+    """
+
+    kind = "product_with_load"
+    title = "Product of a signal and the load"
+    formula = r"c\,\tau_j\,f(s)\ \text{or}\ c\,|\tau_j|\,f(s)"
+    coefficients = unnamed_coefficients(1)
+    needs = ("load",)
+    search = "screened"
+    is_of_one_number = True
+
+    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
+        return (shape["of"], f"tau{joint + 1}")
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        return []
+
+    def shape_of(self, factors: Sequence[Factor]) -> dict[str, Any]:
+        """Shape of a product.
+
+        Parameters
+        ----------
+        factors : sequence of Factor
+            Functions of the load and of the signal.
+        """
+        load, (of, function, middle) = factors
+        return {"load": load.function, "of": of, "function": function, "middle": middle}
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        assert signals.load is not None
+        load = Factor(f"tau{joint + 1}", shape["load"]).of(signals.load[:, joint])
+        factor = Factor(shape["of"], shape["function"], shape["middle"])
+        return (load * _values(signals, factor))[:, None]
+
+
 class SizeByRecording(NamelessEffect):
     """A simple function of a signal with a size of its own in every recording.
 
@@ -135,4 +173,4 @@ def _values(signals: Signals, factor: Factor) -> Array:
     return factor.of(signals.named(name))
 
 
-PRODUCTS: tuple[type[NamelessEffect], ...] = (ProductOfSignals, SizeByRecording)
+PRODUCTS: tuple[type[NamelessEffect], ...] = (ProductOfSignals, ProductWithLoad, SizeByRecording)

@@ -58,3 +58,17 @@ def test_a_product_of_signals_that_do_nothing_alone_is_followed():
     (finding,) = diagnosis.findings
     assert finding.joints == (6,)
     assert set(finding.variables) == {"dq4", "dq5"}
+
+
+def test_a_loss_under_load_that_follows_the_speed_of_another_joint_names_both():
+    log = make_hidden_effect_log(load_ur5(), None, random_state=11, **SHORT)
+    q, dq = (log.X[[f"{name}{j}" for j in range(1, 7)]].to_numpy() for name in ("q", "dq"))
+    load = log.robot.inverse_dynamics(q, dq, np.zeros_like(q))
+    y = np.array(log.y, dtype=float)
+    y[:, 2] += 0.3 * load[:, 2] * dq[:, 0]
+
+    diagnosis = diagnosed(log, y)
+
+    finding = diagnosis.findings[0]
+    assert (finding.kind, finding.joints) == ("unknown", (3,))
+    assert set(finding.variables) == {"dq1", "tau3"}

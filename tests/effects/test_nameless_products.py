@@ -34,3 +34,11 @@ def test_a_function_has_another_size_in_each_recording_and_none_in_others(signal
         np.testing.assert_allclose(column[here], signals.q[here, 1] - 0.3)
         assert not column[~here].any()
     assert effect.variables(0, shape) == ("q2", "trajectory")
+
+
+def test_a_product_with_the_load_is_one_of_the_own_joint(signals):
+    effect = get_effect("product_with_load")
+    factors = Factor("load", "size"), Factor("q2", "value", 0.3)
+    column = effect.columns(signals, 0, **effect.shape_of(factors))[:, 0]
+    np.testing.assert_allclose(column, np.abs(signals.load[:, 0]) * (signals.q[:, 1] - 0.3))
+    assert effect.variables(0, effect.shape_of(factors)) == ("q2", "tau1")
