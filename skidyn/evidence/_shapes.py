@@ -15,6 +15,8 @@ from skidyn.evidence._problem import Problem
 
 #: First step of a refinement (a factor 1.5, or a share of the travel), its shrinkage and rounds.
 FIRST_STEP, SHRINK, ROUNDS = 0.5, 2.2, 7
+#: Growth of the step from the second one in the same direction on, and most steps in all.
+GROWTH, MOST_MOVES = 1.5, 30
 FIRST_SHARE = 0.06
 #: Trials of a simplex for each parameter at most, and its size in first steps when it stops.
 MOST_TRIALS, CLOSE = 40, 0.01
@@ -133,9 +135,9 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
 
             values[i], best = _moment(problem, values[i], best, gain_since)
             continue
-        came = 0
-        for _ in range(ROUNDS):
-            improved = False
+        came, rounds = 0, 0
+        for _ in range(MOST_MOVES):
+            improved, before = False, came
             for way in (1, -1):
                 if way == -came:
                     continue  # back to a value that explains less
@@ -146,6 +148,12 @@ def refine_term(problem: Problem, term: Term, gain: Gain) -> Term:
                     best, values, improved, came = value, trial, True, way
             if not improved:
                 step, came = step / SHRINK, 0
+            if improved and came == before:
+                step *= GROWTH  # far from the best value, which the first steps would not reach
+                continue
+            rounds += 1
+            if rounds == ROUNDS:
+                break
     if len(shapes) == 1 or not np.isfinite(best):
         return with_values(values)
     further = _by_simplex(shapes, ranges, values, gain_of)

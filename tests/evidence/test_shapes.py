@@ -36,6 +36,21 @@ def test_refined_shape_explains_more_than_any_of_the_grid(problem):
     assert fine.shape["vs"] == pytest.approx(TRUTH, rel=0.5)
 
 
+def test_a_value_far_from_the_grid_is_reached(problem):
+    ratio, signals = 3.2, problem.signals
+    shaft = 0.2 * (signals.ddq[:, 0] + ratio * signals.ddq[:, 1])
+    torque = problem.measured + np.column_stack([shaft, ratio * shaft])
+    terms = list(problem.terms)
+    coupled = make_problem(signals, torque, robot=ROBOT, rigid_body=False, terms=terms)
+    own = [coupled.term_rows(t) for t in coupled.terms]
+    gain = Gain(coupled, own, coupled.fit_own().noise, coupled.target)
+
+    rough = Term("coupled_inertia", (1, 2), {"ratio": 1.0})
+    fine = refine_term(coupled, rough, gain)
+
+    assert fine.shape["ratio"] == pytest.approx(ratio, rel=0.03)
+
+
 def test_an_effect_without_a_shape_is_left_as_it_is(problem):
     own = [problem.term_rows(t) for t in problem.terms]
     gain = Gain(problem, own, problem.fit_own().noise, problem.target)
