@@ -93,7 +93,8 @@ class RankingSearch(RecordingSearch):
             near = h is not names[0] and h.score > NEARLY * names[0].score
             best = max((u.score for u in ranking if self._nameless_there(u, h)), default=0.0)
             inexact = best > h.score + self.settings.least_gain
-            if near or inexact or self._price(h.candidates) > self.settings.white:
+            rough = get_effect(h.kind).is_slow  # the plain formula is an approximation
+            if near or inexact or rough or self._price(h.candidates) > self.settings.white:
                 found += self._in_other_forms(h)
         return self._finals(found, refined=len(found))
 

@@ -83,3 +83,17 @@ def test_a_logger_that_is_started_by_hand_is_late_by_another_time_in_each_record
     ]
     found = [f.parameters["delay"]["value"] for f in findings]
     assert found == pytest.approx(delays, abs=0.002)
+
+
+def test_a_longer_delay_of_one_joint_is_a_pure_one_and_no_load_that_swings():
+    robot, delay = load_planar_arm(), 0.03
+
+    def torque(group, q, dq, ddq):
+        exact = robot.inverse_dynamics(q, dq, ddq) + friction(dq)
+        exact[:, 0] = np.interp(TIME - delay, TIME, exact[:, 0])
+        return exact
+
+    (finding,) = found_in(robot, *log_of(torque))
+
+    assert (finding.kind, finding.joints) == ("time_delay", (1,))
+    assert finding.parameters["delay"]["value"] == pytest.approx(delay, abs=0.002)
