@@ -52,15 +52,15 @@ class RankingSearch(RecordingSearch):
         """Explanations of the residual, best first."""
         screening, recordings = self._screening(), self.by_kind_of_recording()
         once = [self._lines, self._splits, self._parts, self._spans, self._courses]
-        looks: list[Callable[[], Any]] = [*once, *screening, *recordings]
+        looks: list[Callable[[], Any]] = [*once, self.in_every_recording, *screening, *recordings]
         text = f"{self._round}: screening effects"
-        lines, splits, parts, spans, courses, *found = each(lambda look: look(), looks, text)
+        lines, splits, parts, spans, courses, sizes, *found = each(lambda look: look(), looks, text)
         rough = sorted(self._found(found[: len(screening)]) + splits, key=lambda item: item[1])
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
         ranking += [self._against_functions(h, ranking) for h in lines]
         ranking += self._finals([own for of_kind in found[len(screening) :] for own in of_kind])
         ranking += self._finals(parts, refined=0)  # their shapes are refined already
-        ranking += self._finals([*spans, *courses, *self.in_every_recording()], refined=0)
+        ranking += self._finals([*spans, *courses, *sizes], refined=0)
         ranking += self._other_forms(ranking)
         # The least specific explanations are last: differences between recordings, and vibration.
         return sorted(ranking, key=lambda h: (self._is_last(h, ranking), -h.score))

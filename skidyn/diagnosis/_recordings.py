@@ -62,11 +62,21 @@ def recording_candidates(problem: Problem, kinds: Iterable[str]) -> list[Candida
     for whole in terms_by_recording(problem, kinds):
         if not all(_mostly_both_ways(problem, j) for j in whole.places):
             continue
-        rows = problem.term_rows(whole)
-        for group in groups_of_recordings(problem):
-            term = whole.with_shape(trajectories=group)
-            candidates.append(Candidate(whole.kind, term, rows_within(problem, rows, group)))
+        candidates += _in_groups(problem, whole, groups_of_recordings(problem))
     return candidates
+
+
+def _in_groups(problem: Problem, whole: Term, groups: Iterable[tuple[int, ...]]) -> list[Candidate]:
+    """A term of all recordings, in each of some groups of them."""
+    rows = problem.term_rows(whole)
+    return [
+        Candidate(
+            whole.kind,
+            whole.with_shape(trajectories=group),
+            rows_within(problem, rows, group),
+        )
+        for group in groups
+    ]
 
 
 def terms_by_recording(problem: Problem, kinds: Iterable[str]) -> list[Term]:
@@ -131,11 +141,8 @@ def every_recording(problem: Problem, kinds: Iterable[str]) -> list[list[Candida
     found = []
     for kind in kinds:
         if get_effect(kind).sizes_by_recording:
-            for whole in _of_whole_robot(problem, kind)[:1]:
-                rows = problem.term_rows(whole)
-                terms = [whole.with_shape(trajectories=(name,)) for name in names]
-                own = [rows_within(problem, rows, (name,)) for name in names]
-                found.append([Candidate(kind, *pair) for pair in zip(terms, own, strict=True)])
+            plain = _of_whole_robot(problem, kind)[:1]
+            found += [_in_groups(problem, whole, [(name,) for name in names]) for whole in plain]
     return found
 
 
@@ -179,10 +186,7 @@ def drifting(problem: Problem, kinds: Iterable[str], same: Sequence[Candidate]) 
         return []
     found = []
     for whole in _other_levels(problem, set(kinds), same[0].joints):
-        rows = problem.term_rows(whole)
-        for group in (c.term.trajectories or () for c in same):
-            term = whole.with_shape(trajectories=group)
-            found.append(Candidate(DRIFT, term, rows_within(problem, rows, group)))
+        found += _in_groups(problem, whole, (c.term.trajectories or () for c in same))
     return found
 
 

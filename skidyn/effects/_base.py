@@ -96,7 +96,7 @@ class Effect:
         searched there if positions are coarse.
     is_slow : bool
         Whether the formula is valid for slow changes only, so that no fast effect is reported
-        together with it.
+        together with it, and its other forms are tried whatever it leaves.
     simplicity : int
         Rank among rivals that explain the data equally well; the lowest is preferred.
     rivals : tuple of str

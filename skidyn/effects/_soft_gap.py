@@ -14,6 +14,9 @@ TURN = 0.02
 #: Most steps of the solution, relative change of its error at which it ends, and least share of a
 #: step.
 STEPS, SETTLED, SHORTEST = 10, 1e-3, 0.05
+#: Ridge of the equations of a step, relative to their largest diagonal element: a link that gravity
+#: holds at the top of a soft gap makes them singular to rounding errors.
+ROUNDING = 1e-12
 
 
 class LoadOfLink:
@@ -66,7 +69,7 @@ class LoadOfLink:
         self.smooth = _squared_third_differences(self.stretch)
 
     def position(self, load: Array) -> Array:
-        """Position of the motor minus that of the link, rad or m, for a load in N m or N."""
+        """Position of the motor minus that of the link, rad or m, (n_samples,), for a load."""
         return np.asarray(self.gap / 2 * np.tanh(load / self.torque))
 
     def found(self) -> Array:
@@ -115,6 +118,7 @@ class LoadOfLink:
         bands[3, 1:] += up[:-1] ** 2
         bands[2, 1:] += own[:-1] * up[:-1] + down[1:] * own[1:]
         bands[1, 2:] += down[1:-1] * up[1:-1]
+        bands[3] += ROUNDING * bands[3].max()
         right = own * left + _product(self.smooth, load)
         right[:-1] += down[1:] * left[1:]
         right[1:] += up[:-1] * left[:-1]
