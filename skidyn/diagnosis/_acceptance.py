@@ -382,39 +382,52 @@ class JudgingSearch(ChoosingSearch):
         )
 
     def on_neighbours(self, best: Hypothesis) -> Hypothesis:
-        """A coupling with the other pairs of joints on which it explains equally much.
+        """An effect with the other joints on which it explains equally much.
 
-        With parallel axes, the bodies compensate the difference between pairs, so that a small one
-        is no evidence. Of pairs that the data cannot separate, one of neighbours is named, which a
-        transmission mostly couples.
+        With parallel axes, the bodies compensate the difference between pairs of joints, so that a
+        small one is no evidence. Of pairs that the data cannot separate, one of neighbours is
+        named, which a transmission mostly couples. Bodies of other masses also compensate the
+        difference between torque gains of some joints and of others.
         """
-        found = self._on_other_pairs(best)
-        pairs = [h.candidates[-1].joints for h in found]
-        if len(best.candidates) == 1 and found and not self._adjoin(best.candidates[0].joints):
+        found = self._on_other_joints(best)
+        sites = list(dict.fromkeys(h.candidates[-1].joints for h in found))
+        coupling = len(best.candidates) == 1 and len(best.candidates[0].joints) == 2
+        if coupling and found and not self._adjoin(best.candidates[0].joints):
             most = SEPARATES * self._price(best.candidates)
             for other in sorted(found, key=lambda h: -h.score):
                 (candidate,) = other.candidates
                 behind = float((best.gain - other.gain).sum())
                 near = behind < most and self._adjoin(candidate.joints)
                 if near and (judged := self.judged(other)) is not None:
-                    pairs[pairs.index(candidate.joints)] = best.candidates[0].joints
-                    return replace(judged, elsewhere=tuple(pairs))
-        return replace(best, elsewhere=tuple(pairs))
+                    sites[sites.index(candidate.joints)] = best.candidates[0].joints
+                    return replace(judged, elsewhere=tuple(sites))
+        return replace(best, elsewhere=tuple(sites))
 
-    def _on_other_pairs(self, best: Hypothesis) -> list[Hypothesis]:
-        """A coupling on other pairs that share a joint with its own, as far as they are as good."""
+    def _on_other_joints(self, best: Hypothesis) -> list[Hypothesis]:
+        """An effect with one of its terms on other joints, as far as they are as good.
+
+        A coupling is tried on pairs that share a joint with its own, and what a sensor adds to the
+        torque of one joint on each other one.
+        """
         close = max(self.settings.least_gain, (1 - NEARLY) * best.score)
-        pairs = [c for c in best.candidates if len(c.joints) == 2]
-        if best.kind == UNKNOWN or within_recordings(best) or not pairs:
+        if best.kind == UNKNOWN or within_recordings(best):
             return []
-        sites = {c.joints for c in best.candidates}
+        pairs = [c for c in best.candidates if len(c.joints) == 2]
+        gains = [c for c in best.candidates if len(c.joints) == 1 and c.term.effect.sees_model]
+        if not (pairs or (gains and self.problem.rigid_body)):
+            return []
+        taken = {c.joints for c in best.candidates}
         others = self.strongest(
-            lambda c: c.joints, lambda c: c.kind == best.kind and c.joints not in sites
+            lambda c: c.joints, lambda c: c.kind == best.kind and c.joints not in taken
         )
         found: list[Hypothesis] = []
-        for own in pairs:
+        for own in pairs or gains:
             rest = [c for c in best.candidates if c is not own]
-            near = [others[joints] for joints in sorted(others) if set(joints) & set(own.joints)]
+            near = [
+                others[joints]
+                for joints in sorted(others)
+                if len(joints) == len(own.joints) and (own in gains or set(joints) & set(own.joints))
+            ]
             found += [
                 h
                 for h in self._finals([[*rest, other] for other in near], refined=len(near))

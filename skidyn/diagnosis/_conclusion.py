@@ -397,7 +397,7 @@ def _sure(
             f" The finding of {get_effect(finding.instead).title.lower()} would explain most of it "
             "if its formula were different, which makes the name less certain."
         )
-    # Only one of several equivalent pairs of joints is right.
+    # Only one of several equivalent joints or pairs of joints is right.
     return replace(finding, sentence=told, confidence=probability / (1 + len(finding.elsewhere)))
 
 

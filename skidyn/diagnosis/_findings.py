@@ -80,8 +80,8 @@ class Finding:
     alike : bool
         Whether a kind that acts on other joints explains the data equally well.
     elsewhere : tuple of tuple of int
-        Other pairs of joints, counted from 1, on which the same effect explains the data equally
-        well.
+        Other joints or pairs of joints, counted from 1, on which the same effect explains the data
+        equally well.
     change : float
         Squared error that the effect, or the friction of its joints, would remove in addition if it
         changed over the log or with the motion, as a share of what it removes; 0 if no change is
@@ -262,9 +262,9 @@ def make_finding(
             * bool(effect.separating_motion)
             + "."
         )
-    elsewhere = tuple(tuple(j + 1 for j in pair) for pair in hypothesis.elsewhere)
+    elsewhere = tuple(tuple(j + 1 for j in site) for site in hypothesis.elsewhere)
     if elsewhere:
-        sentence += f" It would explain the data equally well on {pairs_of(elsewhere)}."
+        sentence += f" It would explain the data equally well on {sites_told(elsewhere)}."
     nearest = nearest_of(problem, hypothesis)
     if nearest:
         sentence += (
@@ -298,9 +298,9 @@ def make_finding(
     )
 
 
-def pairs_of(pairs: Sequence[Sequence[int]]) -> str:
-    """Text of pairs of joints for a sentence."""
-    return listed(list(map(joints_told, pairs)), "or")
+def sites_told(sites: Sequence[Sequence[int]]) -> str:
+    """Text of joints and pairs of joints for a sentence."""
+    return listed(list(map(joints_told, sites)), "or")
 
 
 def _joints(problem: Problem, hypothesis: Hypothesis, candidate: Candidate) -> tuple[int, ...]:

@@ -44,7 +44,7 @@ class Hypothesis:
         Whether a kind that acts on other joints explains equally much, so that the data cannot
         separate them: for example a plane that a slider touches and the slider's own stop.
     elsewhere : tuple of tuple of int
-        Other pairs of joints, from 0, on which the same kind explains equally much.
+        Other joints or pairs of joints, from 0, on which the same kind explains equally much.
     errors : ndarray of shape (n_folds, n_joints) or None
         Held-out squared error with it; None if it was judged by other means.
     torque : ndarray of shape (n_samples, n_joints) or None

@@ -20,7 +20,7 @@ from skidyn._text import (
     trajectories_told,
 )
 from skidyn.diagnosis._failures import FAILS
-from skidyn.diagnosis._findings import course_told, pairs_of, rival_title, spans_told
+from skidyn.diagnosis._findings import course_told, sites_told, rival_title, spans_told
 from skidyn.diagnosis._rule import GUESS
 from skidyn.diagnosis._servo_motion import servo_motion_told
 from skidyn.effects import get_effect
@@ -343,8 +343,8 @@ def sure(finding: Finding) -> str:
     named += " and acts on these joints" * bool(finding.elsewhere)
     text = "" if share is None else f"confidence {min(share, 0.99):.0%}{named}"
     if finding.elsewhere:
-        pairs = f"on {pairs_of(finding.elsewhere)} it would explain the data equally well"
-        text += f"{'; ' if text else ''}{pairs}"
+        sites = f"on {sites_told(finding.elsewhere)} it would explain the data equally well"
+        text += f"{'; ' if text else ''}{sites}"
     if finding.rivals:
         rivals = listed([rival_title(kind) for kind in finding.rivals], "or")
         text += f"{'; ' if text else ''}this data cannot separate it from {rivals}"

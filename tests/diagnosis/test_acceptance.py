@@ -18,6 +18,7 @@ def test_friction_whose_presliding_is_too_short_to_be_seen_is_coulomb_friction(a
     assert kinds == {"coulomb": {1, 2}}
 
 
+@pytest.mark.slow
 def test_offsets_beside_friction_that_differs_between_directions_are_offsets(arm_log, found_in):
     speed = np.abs(arm_log.X["dq1"].to_numpy())
     torque = np.array(arm_log.y)
@@ -84,6 +85,7 @@ def test_what_depends_on_another_joint_without_a_reaction_is_no_coupling():
     assert diagnosis.verdict == "unknown"
 
 
+@pytest.mark.slow
 def test_friction_without_a_reaction_does_not_hide_that_of_a_coupling():
     log = make_hidden_effect_log(
         load_ur5(), "coupled_friction", joints=(2, 3), noise="low", n_trajectories=8, random_state=2
@@ -112,3 +114,16 @@ def test_a_floor_that_explains_all_that_a_larger_force_leaves_is_no_error_of_the
     found = set(found_in(robot, log.X, torque))
 
     assert found == {"external_wrench", "environment_contact"}
+
+
+def test_a_gain_may_be_that_of_the_other_joint_where_masses_are_identified():
+    log = make_hidden_effect_log(
+        load_planar_arm(), None, noise="low", n_trajectories=6, duration=5.0, random_state=4
+    )
+
+    (finding,) = diagnose(RBDRegressor(log.robot), log.X, log.y * [1.2, 1.0], checks=()).findings
+
+    assert (finding.kind, finding.joints) == ("torque_gain", (1,))
+    assert finding.elsewhere == ((2,),)
+    assert finding.confidence < 0.5
+    assert "It would explain the data equally well on joint 2." in finding.sentence

@@ -35,6 +35,7 @@ def test_of_explanations_that_a_mass_makes_equal_the_one_with_bodies_as_describe
     assert (finding.kind, finding.joints) == (kind, (2,))
 
 
+@pytest.mark.slow
 def test_plain_friction_that_the_model_lacks_is_found_before_a_power_of_the_velocity(
     without_friction,
 ):

@@ -450,6 +450,7 @@ def test_how_time_recordings_turns_and_units_are_counted_changes_nothing(
     np.testing.assert_allclose(in_newton_meters(figures, 1e9), unchanged[3], rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_trajectories_cut_in_two_give_the_same_finding(torso_log: Any, unchanged: Any) -> None:
     half = torso_log.frame.groupby("trajectory").cumcount() >= 250
 

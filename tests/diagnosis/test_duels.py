@@ -22,7 +22,7 @@ def test_a_finding_is_as_uncertain_as_the_comparison_on_its_own_joint(without_fr
     assert found[1,].margin < found[2,].margin
 
 
-@pytest.mark.parametrize("free", [0.0, 0.3])
+@pytest.mark.parametrize("free", [pytest.param(0.0, marks=pytest.mark.slow), 0.3])
 def test_a_gravity_compensator_is_no_nonlinear_spring(without_friction, free):
     """With a free length or without, within the travel of an arm."""
     arm = without_friction

@@ -103,6 +103,7 @@ def test_a_tilted_base_is_found_beside_large_friction_that_is_missing(found_in):
     assert kinds == {"viscous": {1, 2, 3}, "base_tilt": {1, 2, 3, 4, 5, 6}}
 
 
+@pytest.mark.slow
 def test_friction_that_falls_while_a_gear_warms_up_is_one_drift(arm_log, found_in):
     time, dq = arm_log.X["time"].to_numpy(), arm_log.X["dq1"].to_numpy()
     since = time - time.min()

@@ -27,6 +27,7 @@ def found(log, torque):
     return {(f.kind, f.joints) for f in diagnosis.findings}
 
 
+@pytest.mark.slow
 def test_a_sensor_zeroed_anew_before_each_recording(log):
     shift = 0.6 * np.random.default_rng(1).normal(size=10)
     torque = np.array(log.y)

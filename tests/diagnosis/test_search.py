@@ -9,6 +9,7 @@ from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
 
+@pytest.mark.slow
 def test_fast_motion_under_a_precise_torque_makes_no_joint_elastic(found_in):
     log = make_hidden_effect_log(load_scara(), None, noise="low", random_state=1022)
 
@@ -26,7 +27,13 @@ def test_a_cable_that_only_pulls_between_two_joints(arm_log, found_in):
     assert found_in(load_planar_arm(), arm_log.X, torque) == {"coupling_spring": {1, 2}}
 
 
-@pytest.mark.parametrize("kind", ["temperature_offset", "dahl", "coupled_friction"])
+@pytest.mark.parametrize("kind",
+    [
+        "temperature_offset",
+        pytest.param("dahl", marks=pytest.mark.slow),
+        pytest.param("coupled_friction", marks=pytest.mark.slow),
+    ],
+)
 def test_what_the_formula_of_an_added_effect_leaves_is_no_other_effect(kind):
     """The log is diagnosed again after each effect that is added."""
     options = {"n_trajectories": 10, "duration": 6.0, "rate": 200.0, "random_state": 3}

@@ -28,9 +28,10 @@ def away(log, name):
             lambda log: 1.2 * away(log, "q1") * away(log, "q2") * log.X["dq3"],
             {"q1", "q2", "dq3"},
         ),
-        (
+        pytest.param(
             lambda log: 0.3 * np.sign(away(log, "q2")) * np.abs(log.X["dq5"]),
             {"q2", "dq5"},
+            marks=pytest.mark.slow,
         ),
     ],
     ids=["of three", "of two"],
@@ -60,6 +61,7 @@ def test_a_product_of_signals_that_do_nothing_alone_is_followed():
     assert set(finding.variables) == {"dq4", "dq5"}
 
 
+@pytest.mark.slow
 def test_a_loss_under_load_that_follows_the_speed_of_another_joint_names_both():
     log = make_hidden_effect_log(load_ur5(), None, random_state=11, **SHORT)
     q, dq = (log.X[[f"{name}{j}" for j in range(1, 7)]].to_numpy() for name in ("q", "dq"))

@@ -59,6 +59,7 @@ def test_a_force_beside_the_origin_of_the_tool_is_told_with_its_moment_and_frame
     assert ("turns with the tool" in found.sentence) == bool(frame)
 
 
+@pytest.mark.slow
 def test_a_force_may_act_in_most_recordings():
     log = make_hidden_effect_log(
         load_ur5(), None, noise="low", n_trajectories=7, duration=4.0, random_state=0
@@ -126,7 +127,7 @@ def test_a_payload_of_another_link_is_one_and_not_a_zero_of_its_joint():
     assert [term.form for term in better.effect_terms_ if term.kind == "payload"] == [{"link": 3}]
 
 
-@pytest.mark.parametrize("seed", [1, 4])
+@pytest.mark.parametrize("seed", [1, pytest.param(4, marks=pytest.mark.slow)])
 def test_a_force_is_found_in_recordings_in_which_a_single_joint_moves(seed):
     """Their own estimates of the force are arbitrary, but their torque tells whether it acts."""
     rng, robot, acting = np.random.default_rng(seed), load_panda(), (1, 2, 7)

@@ -137,7 +137,7 @@ NATIVE = {
 }
 
 #: Of these, some that need most of what all of them need of other packages.
-QUICK = ("rotor_inertia", "coupled_friction", "external_wrench")
+QUICK = ("rotor_inertia", "external_wrench")
 
 
 def motion(rng, n, seconds=6.0, step=0.01):

@@ -53,6 +53,7 @@ def test_a_mass_that_no_motion_shows_does_not_change_a_tilt(lever):
     assert (error < 0.2).all()
 
 
+@pytest.mark.slow
 def test_a_base_that_leans_from_one_recording_on():
     arm = three_links(0.0)
     log = make_hidden_effect_log(arm, None, n_trajectories=8, duration=5.0)

@@ -177,6 +177,7 @@ def test_a_contact_of_the_tool_is_found_with_the_link_that_touches():
     assert f"link '{TOOL}'" in finding.sentence
 
 
+@pytest.mark.slow
 def test_a_ball_that_the_tool_presses_into_is_found_with_its_size():
     robot = with_tool()
     log = make_hidden_effect_log(robot, None, n_trajectories=6, duration=5.0, random_state=1)

@@ -18,6 +18,7 @@ def test_torque_of_something_else(recorded, told_of):
     assert told_of(other)["unexplained"].joints == (2,)
 
 
+@pytest.mark.slow
 def test_a_heavy_payload_in_half_of_many_recordings_is_no_mistake():
     robot = load_ur5()
     names = {name: [f"{name}{j + 1}" for j in range(6)] for name in ("q", "dq", "tau")}
