@@ -97,7 +97,8 @@ def told_alone(
     A coefficient that only one fold determines is not held out with it, because the other folds
     would give it an arbitrary value. Of an effect that acts in some recordings, this holds as soon
     as any combination of its coefficients is determined by one of them: the inertia of a payload of
-    two recordings, for example.
+    two recordings, for example. If friction has another level in all recordings but one, this one
+    alone determines the friction to which the levels are added.
 
     Parameters
     ----------
@@ -109,10 +110,10 @@ def told_alone(
         Whether each effect acts in some recordings only and is held out with whole recordings;
         none by default.
     """
-    squares = np.diagonal(grams, axis1=1, axis2=2)
+    some_of = in_some or [False] * len(widths)
+    squares = _beside(grams, _columns_of(grams.shape[1], widths, some_of))
     alone = np.zeros(squares.shape, dtype=bool)
     end = squares.shape[1]
-    some_of = in_some or [False] * len(widths)
     for width, some in zip(reversed(widths), reversed(some_of), strict=True):
         own = slice(end - width, end)
         if some:
@@ -123,6 +124,51 @@ def told_alone(
         alone[:, own] = confined[:, None]
         end -= width
     return alone
+
+
+def bases_alone(grams: Array, terms: Sequence[Term], further: int = 0) -> NDArray[np.bool_]:
+    """Coefficients that one fold determines since other effects differ between recordings.
+
+    Parameters
+    ----------
+    grams : ndarray of shape (n_folds, n_coefficients, n_coefficients)
+        Products of the columns of every fold: bodies, terms and further columns.
+    terms : sequence of Term
+        Every effect of the model.
+    further : int, default=0
+        Number of further columns.
+
+    Returns
+    -------
+    ndarray of shape (n_folds, n_coefficients) of bool
+    """
+    end = grams.shape[1] - further
+    own, widths = grams[:, :end, :end], [t.width for t in terms]
+    in_some = [t.trajectories is not None for t in terms]
+    alone = np.zeros(grams.shape[:2], dtype=bool)
+    if any(in_some):
+        alone[:, :end] = told_alone(own, widths, in_some) & ~told_alone(own, widths)
+        alone[:, _columns_of(end, widths, in_some)] = False
+    return alone
+
+
+def _columns_of(n: int, widths: Sequence[int], wanted: Sequence[bool]) -> NDArray[np.intp]:
+    """Places of the columns of some effects, which come last among n columns."""
+    return n - sum(widths) + np.flatnonzero(np.repeat(wanted, widths))
+
+
+def _beside(grams: Array, others: NDArray[np.intp]) -> Array:
+    """Squares of every column in every fold, of the part that some columns do not explain there.
+
+    Of these columns themselves, the whole squares. Shape (n_folds, n_coefficients).
+    """
+    squares = np.array(np.diagonal(grams, axis1=1, axis2=2))
+    if len(others):
+        within = np.linalg.pinv(grams[:, others[:, None], others], rcond=NEW_SHARE, hermitian=True)
+        explained = np.einsum("fic,fij,fjc->fc", grams[:, others], within, grams[:, others])
+        explained[:, others] = 0.0
+        squares = np.where(explained > (1 - NEW_SHARE) * squares, 0.0, squares - explained)
+    return squares
 
 
 def _largest_shares(grams: Array) -> Array:

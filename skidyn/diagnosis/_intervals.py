@@ -17,6 +17,7 @@ import numpy as np
 from scipy.stats import t as student_t
 
 from skidyn._signals import Array
+from skidyn.diagnosis._held_out import bases_alone
 from skidyn.effects import Shape, Term, TermSum
 from skidyn.evidence import (
     Problem,
@@ -58,7 +59,12 @@ def parameter_intervals(
     """
     blocks = [problem.term_rows(t) for t in terms]
     whole, held = left_out_coefficients(
-        problem, problem.design(blocks), sigma, problem.target, soft=problem.soft(terms)
+        problem,
+        problem.design(blocks),
+        sigma,
+        problem.target,
+        soft=problem.soft(terms),
+        kept=lambda grams: bases_alone(grams, terms),
     )
     places = list(TermSum(terms).slices(len(problem.rigid_index)))
     at = len(whole)
@@ -67,7 +73,8 @@ def parameter_intervals(
     grams, cross = fold_products(problem, design, sigma, problem.target)
     known = np.zeros(len(cross[0]))
     known[len(known) - len(spread) :] = 1 / np.square(spread)
-    full, left = solve_left_out(grams, cross, (np.diag(known), np.zeros(len(known))))
+    stay = bases_alone(grams, terms, len(spread))
+    full, left = solve_left_out(grams, cross, (np.diag(known), np.zeros(len(known))), kept=stay)
     result = {}
     for i, (term, own) in enumerate(places):
         apart = _half_width(held[:, own]) < np.abs(whole[own])
