@@ -265,13 +265,15 @@ class JudgingSearch(ChoosingSearch):
         The formula of an oscillating link is of first order: it leaves more to an unknown function,
         and to a delay, which is the first order of any lag. A part of the recordings is chosen for
         what the formula leaves there. Of a family, the simplest formula that explains nearly as
-        much as the best one is used, which leaves the rest. A function of the same signals is the
-        error of a formula rather than another effect, up to the same share.
+        much as the best one is used, which leaves the rest. A function of the same signals, also
+        one with a size in each recording, is the error of a formula rather than another effect, up
+        to the same share.
         """
         settings = self.settings
         first_order = beside.kind == UNKNOWN or any(
             c.term.effect.is_slow for c in beside.candidates
         )
+        signals = set(beside.variables) - {"trajectory"} if beside.kind == UNKNOWN else set()
         shares = np.full(self.problem.n_joints, settings.exact_tolerance)
         for h in [*self.earlier, *self.findings]:
             if h.kind == UNKNOWN and h.torque is not None:
@@ -283,8 +285,8 @@ class JudgingSearch(ChoosingSearch):
                 swings = c.term.effect.moves_link and first_order
                 loose = nameless or swings or in_part(beside)
                 share = settings.nameless_tolerance if loose else settings.form_tolerance
-                same = beside.kind == UNKNOWN and set(beside.variables) <= _signals_of(c)
-                if c.term.effect.family or (same and beside.variables):
+                same = bool(signals) and signals <= _signals_of(c)
+                if c.term.effect.family or same:
                     share = max(share, 1 - settings.family_share)
                 reached = list(c.rows)
                 shares[reached] = np.maximum(shares[reached], share)
@@ -423,11 +425,8 @@ class JudgingSearch(ChoosingSearch):
         found: list[Hypothesis] = []
         for own in pairs or gains:
             rest = [c for c in best.candidates if c is not own]
-            near = [
-                others[joints]
-                for joints in sorted(others)
-                if len(joints) == len(own.joints) and (own in gains or set(joints) & set(own.joints))
-            ]
+            alike = [joints for joints in sorted(others) if len(joints) == len(own.joints)]
+            near = [others[at] for at in alike if own in gains or set(at) & set(own.joints)]
             found += [
                 h
                 for h in self._finals([[*rest, other] for other in near], refined=len(near))

@@ -20,7 +20,7 @@ from skidyn._text import (
     trajectories_told,
 )
 from skidyn.diagnosis._failures import FAILS
-from skidyn.diagnosis._findings import course_told, sites_told, rival_title, spans_told
+from skidyn.diagnosis._findings import course_told, rival_title, sites_told, spans_told
 from skidyn.diagnosis._rule import GUESS
 from skidyn.diagnosis._servo_motion import servo_motion_told
 from skidyn.effects import get_effect

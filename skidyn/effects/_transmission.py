@@ -5,16 +5,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Effect
 from skidyn.effects._derivatives import smooth_derivatives
+from skidyn.effects._load_of_link import LoadOfLink, SoftGap, Stiffening, Yielding
 from skidyn.effects._nameless import NamelessEffect
 from skidyn.effects._parameters import Coefficient, Shape
-from skidyn.effects._soft_gap import LoadOfLink
+
+Shared = TypeVar("Shared")
 
 
 def _swing(
@@ -116,19 +118,20 @@ _STEP = 1e-6
 MOTION = ("position", "velocity", "acceleration")
 
 
-def _shared(signals: Signals, joint: int, name: str, make: Callable[[], Array]) -> Array:
+def _shared(signals: Signals, joint: int, name: str, make: Callable[[], Shared]) -> Shared:
     """A quantity of a joint that does not depend on the shape.
 
     Shapes only change the motion of the link. Quantities are cached for the last joint: shapes of
     one joint are evaluated in succession, and all joints together would take many times the memory
     of the log.
     """
-    kept: dict[tuple[int, str], Array] = signals.once("shared by shapes", dict, of_fit=True)
+    kept: dict[tuple[int, str], Any] = signals.once("shared by shapes", dict, of_fit=True)
     if (joint, name) not in kept:
         for other in [key for key in kept if key[0] != joint]:
             del kept[other]
         kept[joint, name] = make()
-    return kept[joint, name]
+    found: Shared = kept[joint, name]
+    return found
 
 
 def _slope(signals: Signals, joint: int, by: str) -> Array:
@@ -217,6 +220,16 @@ class _LinkSideEffect(Effect):
         return {j: own[:, None] for j, own in enumerate(change)}
 
 
+def _yields(signals: Signals, joint: int, gear: Yielding) -> tuple[Array, Array, Array]:
+    """Displacement of a link whose motor is ahead of it by what a load does, and derivatives."""
+
+    def make() -> LoadOfLink:
+        return LoadOfLink(signals, joint, [_slope(signals, joint, by)[joint] for by in MOTION])
+
+    load = _shared(signals, joint, "load of link", make).behind(gear)
+    return smooth_derivatives(gear.position(load), signals)
+
+
 class AccelerationNoise(NamelessEffect):
     """Torques due to the noise of a position in its second derivative.
 
@@ -257,7 +270,12 @@ def _fast_part(values: Array, signals: Signals) -> Array:
 
 
 class JointElasticity(_LinkSideEffect):
-    """A gear that winds up under load, with the encoder on the motor side."""
+    """A gear that winds up under load, with the encoder on the motor side.
+
+    With ``stiffening`` in its shape, in N m, the gear becomes stiffer under load, as a harmonic
+    drive does, and the link does not oscillate: it winds up by the compliance times ``stiffening``
+    times ``asinh(load / stiffening)``. The resonance is then that without load.
+    """
 
     kind = "joint_elasticity"
     drawn_against = "load"
@@ -275,16 +293,40 @@ class JointElasticity(_LinkSideEffect):
         ),
         # An oscillation of low inertia follows the noise of the accelerations at its resonance.
         Shape("damping", "1", (0.2,), 0.005, 0.5, scales=False),
+        Shape("stiffening", "N m", (), 1e-12, np.inf, scales=False),
     )
+    #: As a share of the root mean square of the load.
+    forms = ({"stiffening": 0.5},)
     follows_acceleration = True
     simplicity = 19
     rivals = ("time_delay", "rotor_inertia", "backlash", "base_tilt")
     separating_motion = "fast reversals with a heavy load, near the first resonance"
     reference = "Spong (1987), ASME JDSMC 109(4), 310-319."
 
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        assert signals.load is not None
+        usual, (form,) = _usual(signals.load[:, joints[0]]), self.forms
+        swinging, damping = self.shapes[:2]
+        shapes = [{"resonance": f, "damping": d} for d in damping.grid for f in swinging.grid]
+        stiffening = form["stiffening"] * usual
+        soft = [{"resonance": f, "stiffening": stiffening} for f in SOFT_RESONANCES]
+        return shapes + [s for s in soft if self.admissible(signals, joints, s)]
+
+    def admissible(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
+        if "stiffening" not in shape:
+            return True
+        # At larger loads than there are it is a linear spring, and at tiny ones a gap.
+        assert signals.load is not None
+        load = np.abs(signals.load[:, joints[0]])
+        return bool(LEAST_STIFFENING * load.max() < shape["stiffening"] < load.max())
+
     def moves(self, signals: Signals, joint: int, **shape: Any) -> tuple[Array, Array, Array]:
         assert signals.load is not None
         load, inertia = signals.load[:, joint], _link_inertia(signals, joint)
+        if "stiffening" in shape:
+            compliance = _compliance(shape["resonance"], float(np.median(inertia)))
+            moved = _yields(signals, joint, Stiffening(compliance, shape["stiffening"]))
+            return tuple(own / compliance for own in moved)  # type: ignore[return-value]
         return _swing(load, inertia, signals, shape["resonance"], shape["damping"])
 
     def bounded(
@@ -297,7 +339,7 @@ class JointElasticity(_LinkSideEffect):
         # Resonance and inertia determine the compliance of a joint that oscillates freely.
         if "inertia" not in shape:
             return 0.0
-        return float(shape["share"] / (shape["inertia"] * (2 * np.pi * shape["resonance"]) ** 2))
+        return float(shape["share"] * _compliance(shape["resonance"], shape["inertia"]))
 
     def fastest(self, shape: Mapping[str, Any]) -> float:
         return float(shape["resonance"])
@@ -307,10 +349,28 @@ class JointElasticity(_LinkSideEffect):
     ) -> dict[str, Any]:
         compliance = float(coefficients[0])
         stiffness = 1.0 / compliance if compliance else np.inf
-        return {"K": stiffness, "resonance": shape["resonance"], "damping": shape["damping"]}
+        further = {name: shape[name] for name in ("damping", "stiffening") if name in shape}
+        return {"K": stiffness, "resonance": shape["resonance"], **further}
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
-        return {"K": "N/m" if prismatic else "N m/rad", "resonance": "Hz", "damping": "1"}
+        stiffness, torque = ("N/m", "N") if prismatic else ("N m/rad", "N m")
+        return {"K": stiffness, "resonance": "Hz", "damping": "1", "stiffening": torque}
+
+
+#: Resonances, Hz, without load with which the search for a gear that becomes stiffer starts.
+SOFT_RESONANCES = (30.0, 10.0)
+#: Least load from which a gear becomes stiffer, as a share of the largest load.
+LEAST_STIFFENING = 0.02
+
+
+def _usual(load: Array) -> float:
+    """Root mean square of a load."""
+    return float(np.sqrt(np.mean(load**2)))
+
+
+def _compliance(resonance: float, inertia: float) -> float:
+    """Compliance, rad/(N m), of a spring on which an inertia, kg m^2, has a resonance in Hz."""
+    return 1 / (inertia * (2 * np.pi * resonance) ** 2)
 
 
 class Backlash(_LinkSideEffect):
@@ -341,7 +401,7 @@ class Backlash(_LinkSideEffect):
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         assert signals.load is not None
         load, unit = signals.load[:, joints[0]], float(signals.unit[joints[0]])
-        usual = float(np.sqrt(np.mean(load**2)))
+        usual = _usual(load)
         (form,) = self.forms
         shapes: list[dict[str, Any]] = [{"gap": gap * unit} for gap in self.shapes[0].grid]
         soft = [{"gap": gap * unit, "torque": form["torque"] * usual} for gap in SOFT_GAPS]
@@ -358,9 +418,7 @@ class Backlash(_LinkSideEffect):
     def moves(self, signals: Signals, joint: int, **shape: Any) -> tuple[Array, Array, Array]:
         assert signals.load is not None
         if "torque" in shape:
-            slopes = [_slope(signals, joint, by)[joint] for by in MOTION]
-            load = LoadOfLink(signals, joint, slopes, shape["gap"], shape["torque"])
-            return smooth_derivatives(load.position(load.found()), signals)
+            return _yields(signals, joint, SoftGap(shape["gap"], shape["torque"]))
         free = signals.load[:, joint] / _link_inertia(signals, joint)
         position: Array = np.zeros_like(free)
         for rows, step in zip(signals.segments, signals.steps, strict=True):

@@ -21,3 +21,13 @@ def test_what_one_recording_alone_determines_is_not_held_out_with_it():
     assert not told_alone(grams, [2]).any()
     np.testing.assert_array_equal(told_alone(grams, [2], [True]), [[True, True], [False, False]])
     assert not told_alone(0 * grams, [2], [True]).any()
+
+
+def test_what_differs_in_all_recordings_but_one_is_told_by_this_one_alone():
+    # one column of all recordings, and the same in the second and in the third alone
+    levels = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 1.0]])
+    grams = levels[:, :, None] * levels[:, None, :]
+
+    alone = told_alone(grams, [1, 1, 1], [False, True, True])
+
+    np.testing.assert_array_equal(alone, np.eye(3, dtype=bool))

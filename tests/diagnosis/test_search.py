@@ -27,7 +27,8 @@ def test_a_cable_that_only_pulls_between_two_joints(arm_log, found_in):
     assert found_in(load_planar_arm(), arm_log.X, torque) == {"coupling_spring": {1, 2}}
 
 
-@pytest.mark.parametrize("kind",
+@pytest.mark.parametrize(
+    "kind",
     [
         "temperature_offset",
         pytest.param("dahl", marks=pytest.mark.slow),
