@@ -19,12 +19,20 @@ from skidyn.diagnosis._hypothesis import (
     grouped_by_joints,
     in_part,
     is_plain_friction,
+    on_pairs,
     removed_share,
     simplicity_of,
     some_recordings,
     within_recordings,
 )
-from skidyn.diagnosis._rule import ALL_LEFT, BEYOND_FORMULAS, IMITATED, NEARLY, TAKEN_BACK
+from skidyn.diagnosis._rule import (
+    ALL_LEFT,
+    BEYOND_FORMULAS,
+    IMITATED,
+    NEARLY,
+    ON_ONE_OF_TWO,
+    TAKEN_BACK,
+)
 from skidyn.diagnosis._tester import Tester
 
 
@@ -137,18 +145,19 @@ class JudgingSearch(ChoosingSearch):
         joints = range(self.problem.n_joints)
         settings, tolerance = self.settings, self._tolerance(hypothesis)
         own, earlier = self._removed(self.left, hypothesis.gain), self.start - self.left
-        if not self._mostly_small(joints, hypothesis.gain, own, tolerance * earlier):
+        if not self._mostly_small(joints, hypothesis, hypothesis.gain, own, tolerance * earlier):
             return False
         if self._beyond_formulas(hypothesis):
             return False
         # The error of an imperfect formula does not become noise by one known effect.
         known = hypothesis.kind != UNKNOWN and not within_recordings(hypothesis)
-        most = self._mostly_small(joints, hypothesis.gain, own, 0.5 * self.left)
+        most = self._mostly_small(joints, hypothesis, hypothesis.gain, own, 0.5 * self.left)
         if not known or most or self._second_of_velocity(hypothesis):
             return True
         # Nor does it vanish on several joints by one force.
         several = all(len(c.rows) > 1 for c in hypothesis.candidates)
-        if several and not self._mostly_small(joints, hypothesis.gain, own, ALL_LEFT * self.left):
+        least = ALL_LEFT * self.left
+        if several and not self._mostly_small(joints, hypothesis, hypothesis.gain, own, least):
             return False
         return self._price(hypothesis.candidates) > settings.white
 
@@ -292,15 +301,19 @@ class JudgingSearch(ChoosingSearch):
                 shares[reached] = np.maximum(shares[reached], share)
         return shares
 
-    def _mostly_small(self, joints: Sequence[int], gain: Array, own: Array, least: Array) -> bool:
+    def _mostly_small(
+        self, joints: Sequence[int], of: Hypothesis, gain: Array, own: Array, least: Array
+    ) -> bool:
         """Whether most of a gain is on joints of which less than the least share is removed.
 
         It is judged by joint: otherwise a joint whose error another effect reduced by a thousandth
-        would make every gain seem small.
+        would make every gain seem small. A coupling has the same evidence on both of its joints, of
+        which another effect may have reduced the error of one by far more.
         """
         gained = np.maximum(gain, 0.0)
         large = [j for j in joints if own[j] >= least[j]]
-        return bool(gained[large].sum() < 0.5 * gained[list(joints)].sum())
+        share = ON_ONE_OF_TWO if on_pairs(of) else 0.5
+        return bool(gained[large].sum() < share * gained[list(joints)].sum())
 
     def _removed(self, errors: Array, gain: Array) -> Array:
         """Reduction of the squared error of every joint by a gain of log-likelihood."""

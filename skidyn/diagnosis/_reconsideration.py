@@ -373,7 +373,7 @@ class ReconsideringSearch(DuellingSearch):
         joints = sorted({j for c in old.candidates for j in c.rows})
         gain = self._counts * np.log(np.maximum(before, 1e-300) / np.maximum(after, 1e-300))
         least = self._tolerance(old) * (self.start - after)
-        return self._mostly_small(joints, gain, before - after, least)
+        return self._mostly_small(joints, old, gain, before - after, least)
 
     def _replace(
         self, old: Hypothesis, kept: tuple[Candidate, ...], without: list[Candidate]

@@ -84,6 +84,9 @@ TAKEN_BACK = 0.5
 #: intervals removes above which it acts on a single joint, and share of the error that an effect
 #: with another size in each of many recordings must remove to keep its name (``_ranking.py``).
 ALL_LEFT = 0.9
+#: Share of the gain of a coupling that must be on joints where it is not small beside what earlier
+#: effects removed (``_acceptance.py``).
+ON_ONE_OF_TWO = 0.3
 #: Share of the error that an explanation must remove beside free functions of the signals of
 #: earlier effects, over that without these, not to be an error of their formulas
 #: (``_acceptance.py``).
