@@ -187,12 +187,15 @@ class Payload(_ToolEffect):
 
 
 class ExternalWrench(_ToolEffect):
-    """A constant force on the tool: a hose, a spring balancer, a hand that pulls.
+    r"""A constant force on the tool: a hose, a spring balancer, a hand that pulls.
 
     If it does not act at the origin of the tool, its moment about the origin is constant, too. Its
     direction is that in the frame of the base, or, with ``on_tool``, that in the frame of the tool,
-    as of a jet or a propeller. The tool is the origin of the last body, or with ``point`` the link
-    of this name that is fixed to it.
+    as of a jet or a propeller. With ``arm`` in its shape, a force in the frame of the base pulls at
+    a point that turns with the tool, as a hose that is fixed to it somewhere: its moment is
+    :math:`(R\,p) \times f`, linear in the products of the coordinates of the point and the force.
+    The tool is the origin of the last body, or with ``point`` the link of this name that is fixed
+    to it.
     """
 
     kind = "external_wrench"
@@ -203,7 +206,7 @@ class ExternalWrench(_ToolEffect):
         *(Coefficient(f"f{axis}", "N") for axis in "xyz"),
         *(Coefficient(f"m{axis}", "N m") for axis in "xyz"),
     )
-    forms = ({"on_tool": 1.0},)
+    forms = ({"on_tool": 1.0}, {"arm": 1.0})
     places = ("point",)
     # One trajectory determines a force, and a moment only if it turns the tool about all axes.
     leading = 3
@@ -216,6 +219,12 @@ class ExternalWrench(_ToolEffect):
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
         parts = [tool_jacobian(signals, shape), _turning_jacobian(signals)]
+        if "arm" in shape:
+            axes = _tool_pose(signals, {})[1].transpose(0, 2, 1)
+            # the moment of a unit force along each axis of the base, a metre along one of the tool
+            moments = np.cross(axes[:, :, None], np.eye(3))
+            parts[1] = np.einsum("nabk,nkj->nabj", moments, parts[1])
+            parts[1] = parts[1].reshape(len(axes), 9, -1)
         if "on_tool" in shape:
             orientation = _tool_pose(signals, {})[1]
             parts = [np.einsum("iab,iaj->ibj", orientation, part) for part in parts]
@@ -229,9 +238,20 @@ class ExternalWrench(_ToolEffect):
     def elsewhere(self, signals: Signals) -> list[dict[str, Any]]:
         return list(points_of_tool(signals)[1:])
 
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        if "arm" not in shape:
+            return self.coefficients
+        products = [Coefficient(f"{a}f{b}", "N m") for a in "xyz" for b in "xyz"]
+        return (*self.coefficients[:3], *products)
+
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
+        if "arm" in shape:
+            force, products = coefficients[:3], np.reshape(coefficients[3:], (3, 3))
+            arm = products @ force / max(float(force @ force), np.finfo(float).tiny)
+            names = [f"{what}_{axis}" for what in ("force", "arm") for axis in "xyz"]
+            return dict(zip(names, map(float, (*force, *arm)), strict=True))
         frame = "tool_" if "on_tool" in shape else ""
         names = [f"{frame}{what}_{axis}" for what in ("force", "moment") for axis in "xyz"]
         values: dict[str, Any] = dict(zip(names, map(float, coefficients), strict=True))
@@ -245,6 +265,7 @@ class ExternalWrench(_ToolEffect):
     def units(self, prismatic: bool = False) -> dict[str, str]:
         frames = ("", "tool_")
         force = {f"{frame}force_{a}": "N" for frame in frames for a in "xyz"}
+        force |= {f"arm_{a}": "m" for a in "xyz"}
         return force | {f"{frame}moment_{a}": "N m" for frame in frames for a in "xyz"}
 
 

@@ -146,6 +146,22 @@ def with_tool():
     return Robot.from_urdf(f'<robot name="arm"><link name="0"/>{"".join(bodies)}{tool}</robot>')
 
 
+def test_a_force_on_a_point_that_turns_with_the_tool():
+    robot, q = with_tool(), np.random.default_rng(0).uniform(-1.0, 1.0, (200, 3))
+    signals = Signals(q, q, q, trajectory=np.zeros(200, dtype=int), robot=robot)
+    effect, force = get_effect("external_wrench"), np.array([1.0, -2.0, 0.5])
+    coefficients = np.concatenate([force, np.outer(AT, force).ravel()])
+
+    anywhere = effect.torque_columns(signals, (0, 1, 2), arm=1.0)
+    at_tool = effect.torque_columns(signals, (0, 1, 2), point=TOOL)
+
+    for j in range(3):
+        np.testing.assert_allclose(anywhere[j] @ coefficients, at_tool[j][:, :3] @ force, atol=1e-9)
+    found = effect.parameters(coefficients, {"arm": 1.0})
+    np.testing.assert_allclose([found[f"force_{a}"] for a in "xyz"], force)
+    np.testing.assert_allclose([found[f"arm_{a}"] for a in "xyz"], AT)
+
+
 def test_a_contact_acts_at_the_origin_of_the_last_body_or_at_the_tool_fixed_to_it():
     robot, q = with_tool(), np.random.default_rng(0).uniform(-1.0, 1.0, (200, 3))
     signals = Signals(q, q, q, trajectory=np.zeros(200, dtype=int), robot=robot)
