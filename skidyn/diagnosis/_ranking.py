@@ -25,6 +25,7 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._parts import part_candidates
+from skidyn.diagnosis._periodic import find_periodic
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recording_search import RecordingSearch
 from skidyn.diagnosis._recordings import DRIFT, FRICTION, own_effects
@@ -416,7 +417,9 @@ class RankingSearch(RecordingSearch):
         found = []
         least = self.settings.least_share
         if "torque_ripple" in self.kinds:
-            lines = list(filter(self._is_ripple, find_lines(problem, residual, self.significant)))
+            lines = find_lines(problem, residual, self.significant)
+            lines += find_periodic(problem, residual, self.significant)
+            lines = list(filter(self._is_ripple, lines))
             shortest = 1.0 / problem.signals.unit.max()
             found.append(self._of_lines("torque_ripple", "N", shortest, lines, least))
         if self.vibration:
@@ -460,7 +463,7 @@ class RankingSearch(RecordingSearch):
             rows = problem.term_rows(line.term)
             own = Candidate(kind, line.term, rows, variables, n_parts=line.n_parts)
             candidates.append(own)
-        count = 3 * len(candidates)
+        count = sum(c.width + 1 for c in candidates)
         score = float(gain.sum()) - 2 * count
         score -= sum(2 * float(np.log(c.n_parts)) for c in candidates)
         chances = tuple(best[c.joints[0]].chance for c in candidates)

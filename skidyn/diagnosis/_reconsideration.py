@@ -100,8 +100,7 @@ class ReconsideringSearch(DuellingSearch):
             return best
         left = best.errors.sum(0)
         removed = left * np.expm1(np.maximum(best.gain, 0) / self._counts)
-        rivals = [h for h in ranking if h.errors is not None]
-        for rival in self._names_on(best, rivals):
+        for rival in self._names_on(best, ranking):
             first = self.judged(rival)
             if first is None:
                 continue

@@ -108,7 +108,7 @@ def find_lines(
                 continue
             waves = _refined_wave(q[use], r[use], waves)
             term = Term.at("torque_ripple", (joint,), {"N": waves / unit})
-            line = _test_line(problem, term, chance, 2 * HIGHEST, use, r, fold)
+            line = tested_line(problem, term, chance, 2 * HIGHEST, use, r, fold)
             line = _in_part(problem, line, chance, use, r) or line
             weak = _explained_share(r[use], line.torque[use]) <= 0.2
             lines.append(_capped(line, height) if weak else line)
@@ -142,7 +142,7 @@ def _in_part(
     term = line.term.with_shape(N=waves / unit, trajectories=part.recordings)
     # Quarters of the samples are left out, since a single recording may contain the line.
     fold = sample_blocks(problem)[0] % QUARTERS
-    found = _test_line(problem, term, chance, 2 * HIGHEST, use, r, fold)
+    found = tested_line(problem, term, chance, 2 * HIGHEST, use, r, fold)
     if found.gain.sum() <= line.gain.sum():
         return None
     tried = n_parts(len(names), len(part.recordings))
@@ -172,7 +172,7 @@ def find_vibrations(
         found = clock_line(signals, r, use, problem.signals.rate, (SLOWEST, np.inf))
         if found is not None and significant(found.chance):
             term = Term.at("vibration", (joint,), {"frequency": found.frequency})
-            line = _test_line(problem, term, found.chance, 1.0, use, r, fold)
+            line = tested_line(problem, term, found.chance, 1.0, use, r, fold)
             lines.append(_capped(line, found.height))
     return lines
 
@@ -283,7 +283,7 @@ def sample_blocks(
     return index, count
 
 
-def _test_line(
+def tested_line(
     problem: Problem,
     term: Term,
     chance: float,
@@ -292,6 +292,25 @@ def _test_line(
     r: Array,
     fold: NDArray[np.int64],
 ) -> Line:
+    """A wave over the angle or over time with its size, its chance and its held-out gain.
+
+    Parameters
+    ----------
+    problem : Problem
+        Motion.
+    term : Term
+        The wave.
+    chance : float
+        Probability of its height in noise.
+    tried : float
+        Number of waves of which it is the strongest.
+    use : ndarray of shape (n_samples,) of bool
+        Samples that slide.
+    r : ndarray of shape (n_samples,), N m or N
+        Residual of its joint.
+    fold : ndarray of shape (n_samples,)
+        Fold of every sample.
+    """
     (joint,) = term.places
     block = term.torque_columns(problem.signals)[joint]
     rows = np.flatnonzero(use)

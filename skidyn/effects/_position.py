@@ -98,13 +98,18 @@ class PositionDependentFriction(Effect):
 
 
 class TorqueRipple(Effect):
-    """Torque periodic in the position: cogging, gear teeth, a harmonic drive, a ball screw."""
+    """Torque periodic in the position: cogging, gear teeth, a harmonic drive, a ball screw.
+
+    With ``harmonics`` in its shape, the number of them, its waves have another form than a sine, as
+    those of teeth with edges, pins or cams.
+    """
 
     kind = "torque_ripple"
     title = "Torque ripple"
     formula = r"A\sin(N q - \varphi)"
     coefficients = (Coefficient("a", "N m"), Coefficient("b", "N m"))
     shapes = (Shape("N", "1/rad", (), 8.0, 420.0, spacing="linear", scales=False),)
+    forms = ({"harmonics": 3.0},)
     # Averaging over windows of time would remove a fast ripple, so it is searched in the residual
     # at the full rate, as a line in its spectrum over joint angle.
     search = "spectrum"
@@ -115,13 +120,22 @@ class TorqueRipple(Effect):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         phase = shape["N"] * signals.q[:, joint]
-        return np.column_stack([np.sin(phase), np.cos(phase)])
+        orders = range(1, int(shape.get("harmonics", 1)) + 1)
+        return np.column_stack([wave(k * phase) for k in orders for wave in (np.sin, np.cos)])
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        orders = range(2, int(shape.get("harmonics", 1)) + 1)
+        further = [Coefficient(f"{name}{k}", "N m") for k in orders for name in "ab"]
+        return (*self.coefficients, *further)
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
     ) -> dict[str, Any]:
-        a, b = coefficients
-        return {"A": float(np.hypot(a, b)), "phase": float(np.arctan2(-b, a)), **shape}
+        first, *further = np.reshape(coefficients, (-1, 2))
+        phase = float(np.arctan2(-first[1], first[0]))
+        sizes = {f"A{k}": float(np.hypot(*both)) for k, both in enumerate(further, 2)}
+        told = {"A": float(np.hypot(*first)), "phase": phase, **sizes, "N": shape["N"]}
+        return told | {name: x for name, x in shape.items() if name not in told}
 
     def meaning(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         waves, unit = (parameters["N"][name] for name in ("value", "unit"))
@@ -135,4 +149,4 @@ class TorqueRipple(Effect):
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
         torque, length = ("N", "m") if prismatic else ("N m", "rad")
-        return {"A": torque, "phase": "rad", "N": f"1/{length}"}
+        return {"A": torque, "A2": torque, "A3": torque, "phase": "rad", "N": f"1/{length}"}
