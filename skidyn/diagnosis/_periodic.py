@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from skidyn.effects import Term
 from skidyn.evidence import Problem
 
 #: Number of harmonics of a wave.
-HARMONICS = 3
+HARMONICS = 5
 #: Fewest waves within the motion, of which fewer can represent any function of the position, and
 #: most, of which more are lines in a spectrum; step between those that are tried.
 FEWEST, MOST, STEP = 2.5, 24.0, 0.1
@@ -24,9 +24,12 @@ LEAST_SHARE = 0.2
 
 
 def find_periodic(
-    problem: Problem, residual: Array, significant: Callable[[float], bool]
+    problem: Problem,
+    residual: Array,
+    joints: Iterable[int],
+    significant: Callable[[float], bool],
 ) -> list[Line]:
-    """The strongest significant periodic torque over the position of each joint.
+    """The strongest significant periodic torque over the position of each of some joints.
 
     Parameters
     ----------
@@ -34,12 +37,14 @@ def find_periodic(
         Motion and the samples that slide.
     residual : ndarray of shape (n_samples, n_joints), N m or N
         Measured torque less the model.
+    joints : iterable of int
+        Joints, from 0.
     significant : callable
         Whether a torque of a chance is wanted.
     """
     fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
     found = []
-    for joint in range(problem.n_joints):
+    for joint in joints:
         use, r = problem.rows.sliding[:, joint], residual[:, joint]
         q = problem.signals.q[:, joint]
         if use.sum() < PLACES or np.ptp(q[use]) == 0:
@@ -81,6 +86,6 @@ def _best_waves(q: Array, r: Array) -> float | None:
 
 
 def harmonics(phase: Array) -> Array:
-    """Sines and cosines of the harmonics of a phase in rad, (n, 2 * 3)."""
+    """Sines and cosines of the harmonics of a phase in rad, (n, 2 * 5)."""
     waves = np.exp(1j * np.outer(phase, np.arange(1, HARMONICS + 1)))
     return np.stack([waves.imag, waves.real], axis=2).reshape(len(phase), -1)

@@ -29,7 +29,15 @@ from skidyn.diagnosis._periodic import find_periodic
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recording_search import RecordingSearch
 from skidyn.diagnosis._recordings import DRIFT, FRICTION, own_effects
-from skidyn.diagnosis._rule import ALL_LEFT, FEW_WAVES, MASKED, NEARLY, RESOLVED, ROUNDS
+from skidyn.diagnosis._rule import (
+    ALL_LEFT,
+    FEW_WAVES,
+    HARMONIC,
+    MASKED,
+    NEARLY,
+    RESOLVED,
+    ROUNDS,
+)
 from skidyn.diagnosis._screen import Model, Screen
 from skidyn.diagnosis._spans import FOLLOWS_ANY, span_candidates
 from skidyn.diagnosis._spectrum import Line, find_lines, find_vibrations
@@ -418,7 +426,8 @@ class RankingSearch(RecordingSearch):
         least = self.settings.least_share
         if "torque_ripple" in self.kinds:
             lines = find_lines(problem, residual, self.significant)
-            lines += find_periodic(problem, residual, self.significant)
+            free = [j for j in range(problem.n_joints) if not self._harmonic(j)]
+            lines += find_periodic(problem, residual, free, self.significant)
             lines = list(filter(self._is_ripple, lines))
             shortest = 1.0 / problem.signals.unit.max()
             found.append(self._of_lines("torque_ripple", "N", shortest, lines, least))
@@ -469,10 +478,22 @@ class RankingSearch(RecordingSearch):
         chances = tuple(best[c.joints[0]].chance for c in candidates)
         return Hypothesis(kind, tuple(candidates), gain, score, count, chances, torque=torque)
 
+    def _harmonic(self, joint: int) -> list[float]:
+        """Waves per rad, or per m, of ripple with harmonics that was found on a joint."""
+        found = [c.term for h in self.findings for c in h.candidates if c.kind == "torque_ripple"]
+        own = [term for term in found if term.places == (joint,)]
+        return [term.shape["N"] for term in own if "harmonics" in term.shape]
+
     def _is_ripple(self, line: Line) -> bool:
-        """Whether a line has too many waves to be an error of another function of the position."""
+        """Whether a line is neither an error of another function of the position nor a harmonic.
+
+        It has too many waves for the first.
+        """
         joint, signals = line.joint, self.problem.signals
         own, waves = f"q{joint + 1}", line.term.shape["N"]
+        orders = [waves / first for first in self._harmonic(joint)]
+        if any(abs(order - round(order)) < HARMONIC for order in orders):
+            return False
         for h in self.findings:
             nameless = h.kind == UNKNOWN and own in h.variables and joint in h.joints
             if nameless and waves * signals.unit[joint] < RESOLVED:

@@ -66,6 +66,9 @@ RESOLVED = 40.0
 #: Waves over the travel of a joint below which a ripple beside a force over its position is an
 #: error of the formula of this force.
 FEW_WAVES = 4.0
+#: Distance of the order of a wave from a whole number within which it is a harmonic of a ripple
+#: that was found before.
+HARMONIC = 0.03
 #: A column of which less than this share is new to the model is not tested.
 NEW_SHARE = 1e-6
 #: Relative rounding error of what a column removes, found from products.

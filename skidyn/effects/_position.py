@@ -109,7 +109,7 @@ class TorqueRipple(Effect):
     formula = r"A\sin(N q - \varphi)"
     coefficients = (Coefficient("a", "N m"), Coefficient("b", "N m"))
     shapes = (Shape("N", "1/rad", (), 8.0, 420.0, spacing="linear", scales=False),)
-    forms = ({"harmonics": 3.0},)
+    forms = ({"harmonics": 5.0},)
     # Averaging over windows of time would remove a fast ripple, so it is searched in the residual
     # at the full rate, as a line in its spectrum over joint angle.
     search = "spectrum"
@@ -149,4 +149,5 @@ class TorqueRipple(Effect):
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
         torque, length = ("N", "m") if prismatic else ("N m", "rad")
-        return {"A": torque, "A2": torque, "A3": torque, "phase": "rad", "N": f"1/{length}"}
+        sizes = dict.fromkeys(("A", "A2", "A3", "A4", "A5"), torque)
+        return sizes | {"phase": "rad", "N": f"1/{length}"}
