@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Ripple whose waves have another form than a sine, as of teeth and of cams."""
+"""Ripple that is no sine: waves of another form, as of teeth and of cams, or of two lengths."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize, minimize_scalar
 
 from skidyn._signals import Array
 from skidyn.diagnosis._spectrum import HIGHEST, PLACES, Line, tested_line
@@ -19,6 +18,8 @@ HARMONICS = 5
 #: Fewest waves within the motion, of which fewer can represent any function of the position, and
 #: most, of which more are lines in a spectrum; step between those that are tried.
 FEWEST, MOST, STEP = 2.5, 24.0, 0.1
+#: Least difference of the numbers of two waves within the motion.
+APART = 0.7
 #: Least share of the residual of a joint that the waves explain.
 LEAST_SHARE = 0.2
 
@@ -49,18 +50,21 @@ def find_periodic(
         q = problem.signals.q[:, joint]
         if use.sum() < PLACES or np.ptp(q[use]) == 0:
             continue
-        waves = _best_waves(q[use], r[use])
-        if waves is None:
+        shape = _best_shape(q[use], r[use])
+        if shape is None:
             continue
-        term = Term.at("torque_ripple", (joint,), {"N": waves, "harmonics": float(HARMONICS)})
+        term = Term.at("torque_ripple", (joint,), shape)
         line = tested_line(problem, term, 0.0, 2 * HIGHEST, use, r, fold)
         if significant(line.chance):
             found.append(line)
     return found
 
 
-def _best_waves(q: Array, r: Array) -> float | None:
-    """Waves per rad, or per m, that explain most of a residual; None if they explain little."""
+def _best_shape(q: Array, r: Array) -> dict[str, float] | None:
+    """Shape of the waves that explain most of a residual; None if they explain little.
+
+    They are harmonics of one wave, or two waves of any lengths.
+    """
     low, span = float(q.min()), float(np.ptp(q))
     bins = np.minimum(((q - low) / span * PLACES).astype(int), PLACES - 1)
     count = np.bincount(bins, minlength=PLACES)
@@ -69,23 +73,45 @@ def _best_waves(q: Array, r: Array) -> float | None:
     x = (np.bincount(bins, q, PLACES)[held] / count[held] - low) / span
     weight = np.sqrt(count[held])
     y = np.bincount(bins, r, PLACES)[held] / weight
+    most = (1 - LEAST_SHARE) * float(r @ r)
+    within = float(r @ r) - float(y @ y)
+    if within > most:
+        return None  # whatever the form of the waves
     smooth = np.column_stack([np.ones_like(x), x, np.sin(span * x), np.cos(span * x)])
 
-    def left(waves: float) -> float:
-        block = np.column_stack([smooth, harmonics(2 * np.pi * waves * x)]) * weight[:, None]
+    def left(*waves: Array) -> float:
+        block = np.hstack([smooth, *waves]) * weight[:, None]
         return float(np.sum((y - block @ np.linalg.lstsq(block, y, rcond=None)[0]) ** 2))
 
-    tried = np.arange(FEWEST, MOST, STEP)
-    errors: NDArray[np.float64] = np.array([left(waves) for waves in tried])
-    best = float(tried[int(np.argmin(errors))])
-    bounds = max(FEWEST, best - STEP), best + STEP
-    refined = minimize_scalar(left, bounds=bounds, method="bounded")
-    if float(refined.fun) > (1 - LEAST_SHARE) * float(r @ r):
+    def wave(waves: float, orders: int = 1) -> Array:
+        return harmonics(2 * np.pi * waves * x, orders)
+
+    def both(waves: Array) -> float:
+        near = min(waves) < FEWEST or abs(waves[0] - waves[1]) < APART
+        return np.inf if near else left(wave(waves[0]), wave(waves[1]))
+
+    first, harmonic = _best(lambda waves: left(wave(waves, HARMONICS)))
+    one, _ = _best(lambda waves: left(wave(waves)))
+    two, _ = _best(lambda waves: both(np.array([one, waves])))
+    found = minimize(both, [one, two], method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 0})
+    if within + min(harmonic, found.fun) > most:
         return None
-    return float(refined.x) * 2 * np.pi / span
+    unit = 2 * np.pi / span
+    if harmonic <= found.fun:
+        return {"N": first * unit, "harmonics": float(HARMONICS)}
+    return {"N": float(found.x[0]) * unit, "second": float(found.x[1]) * unit}
 
 
-def harmonics(phase: Array) -> Array:
-    """Sines and cosines of the harmonics of a phase in rad, (n, 2 * 5)."""
-    waves = np.exp(1j * np.outer(phase, np.arange(1, HARMONICS + 1)))
+def _best(left: Callable[[float], float]) -> tuple[float, float]:
+    """The number of waves that leaves least, and what it leaves."""
+    tried = np.arange(FEWEST, MOST, STEP).tolist()
+    best = min(tried, key=left)
+    bounds = max(FEWEST, best - STEP), best + STEP
+    found = minimize_scalar(left, bounds=bounds, method="bounded")
+    return float(found.x), float(found.fun)
+
+
+def harmonics(phase: Array, orders: int) -> Array:
+    """Sines and cosines of the harmonics of a phase in rad, (n, 2 * orders)."""
+    waves = np.exp(1j * np.outer(phase, np.arange(1, orders + 1)))
     return np.stack([waves.imag, waves.real], axis=2).reshape(len(phase), -1)

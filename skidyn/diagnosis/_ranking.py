@@ -479,10 +479,10 @@ class RankingSearch(RecordingSearch):
         return Hypothesis(kind, tuple(candidates), gain, score, count, chances, torque=torque)
 
     def _harmonic(self, joint: int) -> list[float]:
-        """Waves per rad, or per m, of ripple with harmonics that was found on a joint."""
+        """Waves per rad, or per m, of ripple in a further form that was found on a joint."""
         found = [c.term for h in self.findings for c in h.candidates if c.kind == "torque_ripple"]
-        own = [term for term in found if term.places == (joint,)]
-        return [term.shape["N"] for term in own if "harmonics" in term.shape]
+        own = [term.shape for term in found if term.places == (joint,) and term.form]
+        return [shape[name] for shape in own for name in ("N", "second") if name in shape]
 
     def _is_ripple(self, line: Line) -> bool:
         """Whether a line is neither an error of another function of the position nor a harmonic.

@@ -142,6 +142,10 @@ class CoupledInertia(_PairEffect):
     If the model has the inertias of both joints already, only the torques ``across`` are missing:
     of each joint through the acceleration of the other, as by a motor that another link carries. Of
     the ratio only the sign matters then.
+
+    Behind a crank or a lever, the shaft turns by another amount per turn of a joint at each
+    position: with a ``lever`` in its shape, in 1/rad, times ``1 + lever (q - middle)`` of the first
+    or the second joint (``of``).
     """
 
     kind = "coupled_inertia"
@@ -149,7 +153,11 @@ class CoupledInertia(_PairEffect):
     title = "Coupled inertia"
     formula = r"I_a\,(\ddot q_i + r\,\ddot q_j)"
     coefficients = (Coefficient("Ia", "kg m^2", sign=1),)
-    forms = ({"across": 1.0},)
+    shapes = (
+        _RATIO,
+        Shape("lever", "1/rad", (), -2.0, 2.0, spacing="linear", scales=False),
+    )
+    forms = ({"across": 1.0}, {"lever": 0.3, "of": 1.0}, {"lever": 0.3, "of": 2.0})
     simplicity = 18
     rivals = ("rotor_inertia",)
     separating_motion = "the two joints accelerated together, then against each other"
@@ -163,11 +171,41 @@ class CoupledInertia(_PairEffect):
     def torque_columns(
         self, signals: Signals, joints: Sequence[int], **shape: Any
     ) -> dict[int, Array]:
+        if "lever" in shape:
+            return _levered(signals, joints, **shape)
         if "across" not in shape:
             return super().torque_columns(signals, joints, **shape)
         i, j = joints
         ratio = np.copysign(self.travel(signals, joints, shape), shape["ratio"])
         return {own: ratio * signals.ddq[:, [other]] for own, other in ((i, j), (j, i))}
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        shapes = super().grid(signals, joints)
+        for shape in shapes:
+            if "lever" in shape:
+                q = signals.q[:, joints[int(shape["of"]) - 1]]
+                shape["middle"] = float((q.min() + q.max()) / 2)
+        return shapes
+
+
+def _levered(
+    signals: Signals,
+    joints: Sequence[int],
+    ratio: float,
+    lever: float,
+    of: float,
+    middle: float,
+    **form: float,
+) -> dict[int, Array]:
+    """Columns of an inertia that turns with a joint through a lever: d/dt of w and its slopes."""
+    behind = joints[int(of) - 1]
+    slope = 1 + lever * (signals.q[:, behind] - middle)
+    slopes = {
+        j: r * (slope if j == behind else 1.0) for j, r in zip(joints, (1.0, ratio), strict=True)
+    }
+    turn = sum(slopes[j] * signals.ddq[:, j] for j in joints)
+    turn = turn + (ratio if of == 2 else 1.0) * lever * signals.dq[:, behind] ** 2
+    return {j: (slopes[j] * turn)[:, None] for j in joints}
 
 
 class CouplingSpring(_PairEffect):

@@ -101,15 +101,19 @@ class TorqueRipple(Effect):
     """Torque periodic in the position: cogging, gear teeth, a harmonic drive, a ball screw.
 
     With ``harmonics`` in its shape, the number of them, its waves have another form than a sine, as
-    those of teeth with edges, pins or cams.
+    those of teeth with edges, pins or cams. With a ``second`` number of waves per rad there are two
+    waves, as of two stages of a gear.
     """
 
     kind = "torque_ripple"
     title = "Torque ripple"
     formula = r"A\sin(N q - \varphi)"
     coefficients = (Coefficient("a", "N m"), Coefficient("b", "N m"))
-    shapes = (Shape("N", "1/rad", (), 8.0, 420.0, spacing="linear", scales=False),)
-    forms = ({"harmonics": 5.0},)
+    shapes = (
+        Shape("N", "1/rad", (), 8.0, 420.0, spacing="linear", scales=False),
+        Shape("second", "1/rad", (), 8.0, 420.0, spacing="linear", scales=False),
+    )
+    forms = ({"harmonics": 5.0}, {"second": 8.0})
     # Averaging over windows of time would remove a fast ripple, so it is searched in the residual
     # at the full rate, as a line in its spectrum over joint angle.
     search = "spectrum"
@@ -119,12 +123,13 @@ class TorqueRipple(Effect):
     reference = "Gandhi, Thorp (2005), IEEE TCST 13(4); Tuttle, Seering (1996), IEEE TRA 12(3)."
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        phase = shape["N"] * signals.q[:, joint]
-        orders = range(1, int(shape.get("harmonics", 1)) + 1)
-        return np.column_stack([wave(k * phase) for k in orders for wave in (np.sin, np.cos)])
+        orders = shape["N"] * np.arange(1, int(shape.get("harmonics", 1)) + 1)
+        orders = [*orders, shape["second"]] if "second" in shape else orders
+        phases = [order * signals.q[:, joint] for order in orders]
+        return np.column_stack([wave(phase) for phase in phases for wave in (np.sin, np.cos)])
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
-        orders = range(2, int(shape.get("harmonics", 1)) + 1)
+        orders = range(2, int(shape.get("harmonics", 2 if "second" in shape else 1)) + 1)
         further = [Coefficient(f"{name}{k}", "N m") for k in orders for name in "ab"]
         return (*self.coefficients, *further)
 
@@ -150,4 +155,4 @@ class TorqueRipple(Effect):
     def units(self, prismatic: bool = False) -> dict[str, str]:
         torque, length = ("N", "m") if prismatic else ("N m", "rad")
         sizes = dict.fromkeys(("A", "A2", "A3", "A4", "A5"), torque)
-        return sizes | {"phase": "rad", "N": f"1/{length}"}
+        return sizes | {"phase": "rad", "N": f"1/{length}", "second": f"1/{length}"}

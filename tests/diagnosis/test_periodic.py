@@ -42,3 +42,18 @@ def test_pins_beside_friction_of_their_joint_are_a_ripple(without_friction):
 
     assert "torque_ripple" in {f.kind for f in findings}
     assert {f.joints for f in findings} == {(2,)}
+
+
+def test_two_waves_of_unrelated_lengths_are_one_ripple(without_friction):
+    arm = without_friction
+    torque, unit = arm.torque.copy(), 2 * np.pi / np.ptp(arm.q[:, 1])
+    waves = [7.0 * unit, 4.3 * unit]
+    size = 0.4 * arm.size[1]
+    torque[:, 1] += size * (np.sin(waves[0] * arm.q[:, 1]) + 0.6 * np.sin(waves[1] * arm.q[:, 1]))
+
+    (finding,) = diagnose(RBDRegressor(arm.robot, ()), arm.X, torque, checks=()).findings
+
+    told = {name: value["value"] for name, value in finding.parameters.items()}
+    assert (finding.kind, finding.joints) == ("torque_ripple", (2,))
+    assert [told["N"], told["second"]] == pytest.approx(waves, rel=0.01)
+    assert [told["A"], told["A2"]] == pytest.approx([size, 0.6 * size], rel=0.05)

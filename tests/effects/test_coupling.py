@@ -152,3 +152,24 @@ def test_a_coupling_with_another_stiffness_beyond_its_bend(signals):
     np.testing.assert_allclose(columns[1], 0.5 * expected)
     assert [c.name for c in effect.coefficients_of({"bent": 1.0})] == ["k", "dk", "tau0"]
     assert [c.name for c in effect.coefficients_of({})] == ["k", "tau0"]
+
+
+@pytest.mark.parametrize("of", [1.0, 2.0])
+def test_the_power_of_an_inertia_behind_a_lever_is_the_change_of_its_energy(signals, of):
+    effect = get_effect("coupled_inertia")
+    shape = {"ratio": -0.6, "lever": 0.8, "of": of, "middle": 0.2}
+    q, dq = signals.q, signals.dq
+    levered = 1 + 0.8 * (q[:, int(of) - 1] - 0.2)
+    turns = (
+        dq
+        * [1.0, -0.6]
+        * np.column_stack([levered if of == k else 1 + 0 * levered for k in (1, 2)])
+    )
+    energy = 0.5 * turns.sum(1) ** 2
+
+    columns = effect.torque_columns(signals, (0, 1), **shape)
+
+    power = sum(columns[j][:, 0] * dq[:, j] for j in range(2))
+    for rows in signals.segments:
+        change = np.gradient(energy[rows], signals.clock[rows])
+        np.testing.assert_allclose(power[rows][2:-2], change[2:-2], atol=0.02 * np.ptp(change))
