@@ -177,7 +177,8 @@ class GravityCompensator(Effect):
     """Coil spring with a lever, or a counterweight: trigonometric in the joint's own position.
 
     A counterweight, and a spring without free length, act as one wave per turn, approximately also
-    other springs, with the second harmonic (``overtone``). A coil spring between a point of either
+    other springs, with the second harmonic (``overtone``), or with the third (``overtone=3``) where
+    the lever changes alike on both sides. A coil spring between a point of either
     link has ``aligned`` in its shape, the position at which both points are on one side of the
     axis, in line with it, and ``lever``, the ratio of their distances to the axis; its force is
     proportional to its length less the free one, so that the torque is ``k`` times the sine of the
@@ -196,33 +197,35 @@ class GravityCompensator(Effect):
         Coefficient("b1", "N m"),
         Coefficient("tau0", "N m", is_zero=True),
     )
-    #: Coefficients of the second harmonic, and of a coil spring.
+    #: Coefficients of the second or third harmonic, and of a coil spring.
     second = (Coefficient("a2", "N m"), Coefficient("b2", "N m"))
+    third = (Coefficient("a3", "N m"), Coefficient("b3", "N m"))
     coil = (Coefficient("k", "N m"), Coefficient("kl", "N m"))
     shapes = (
         Shape("aligned", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("lever", "1", (), 0.05, 0.95, scales=False),
     )
-    forms = ({"overtone": 1.0}, {"aligned": 0.0, "lever": 0.5})
+    forms = ({"overtone": 1.0}, {"overtone": 3.0}, {"aligned": 0.0, "lever": 0.5})
     #: Number of positions, evenly spaced over a turn, at which a coil spring may be aligned.
     n_aligned = 6
-    simplicity = 30
+    simplicity = 29  # as a nonlinear spring: the data decide
     rivals = ("nonlinear_spring", "spring")
     separating_motion = "slow motion over the whole travel"
     reference = "Jubien, Gautier (2013), IFAC; Dietz et al. (2018), coil spring balancers."
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        second, coil = map(dict, self.forms)
+        second, third, coil = map(dict, self.forms)
         q = signals.q[:, joints[0]]
         turn = 2 * np.pi * (np.arange(self.n_aligned) / self.n_aligned - 0.5)
         angles = (q.min() + q.max()) / 2 + turn
-        return [{}, second, *(coil | {"aligned": float(angle)} for angle in angles)]
+        return [{}, second, third, *(coil | {"aligned": float(angle)} for angle in angles)]
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
         *wave, offset = self.coefficients
         if "lever" in shape:
             return (*self.coil, offset)
-        return (*wave, *self.second, offset) if "overtone" in shape else self.coefficients
+        further = {1.0: self.second, 3.0: self.third}.get(shape.get("overtone", 0.0), ())
+        return (*wave, *further, offset)
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         q = signals.q[:, joint]
@@ -230,12 +233,15 @@ class GravityCompensator(Effect):
             x, lever = q - shape["aligned"], shape["lever"]
             length = np.sqrt(1 + lever**2 - 2 * lever * np.cos(x))
             return np.column_stack([np.sin(x), -np.sin(x) / length, np.ones_like(q)])
-        phases = [q, 2 * q] if "overtone" in shape else [q]
-        waves = [wave(phase) for phase in phases for wave in (np.sin, np.cos)]
+        overtone = shape.get("overtone", 0.0)
+        orders = [1, *([3] if overtone == 3.0 else [2] if overtone else [])]
+        waves = [wave(order * q) for order in orders for wave in (np.sin, np.cos)]
         return np.column_stack([*waves, np.ones_like(q)])
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
-        return super().units(prismatic) | {c.name: c.unit for c in (*self.second, *self.coil)}
+        return super().units(prismatic) | {
+            c.name: c.unit for c in (*self.second, *self.third, *self.coil)
+        }
 
     def not_shown(self, signals: Signals, joint: int) -> str | None:
         if signals.prismatic[joint]:

@@ -136,4 +136,7 @@ def test_a_counterweight_and_its_second_harmonic(signals, columns_of):
     two = columns_of("gravity_compensator", signals, overtone=1.0)
     effect = get_effect("gravity_compensator")
     assert [c.name for c in effect.coefficients_of({"overtone": 1.0})][2:4] == ["a2", "b2"]
+    three, q = columns_of("gravity_compensator", signals, overtone=3.0), signals.q[:, 0]
+    np.testing.assert_allclose(three[:, [2, 3]], np.column_stack([np.sin(3 * q), np.cos(3 * q)]))
+    assert [c.name for c in effect.coefficients_of({"overtone": 3.0})][2:4] == ["a3", "b3"]
     np.testing.assert_allclose(two[:, 2:4], np.column_stack([np.sin(2 * q), np.cos(2 * q)]))
