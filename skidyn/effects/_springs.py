@@ -259,7 +259,8 @@ class EndStop(Effect):
     during approach, by the factor ``1 + damping`` times the speed of the approach (Hunt, Crossley
     1975, J. Applied Mechanics 42(2)), and never pulls. With ``q_low`` in the shape there is a
     contact at either end, the second below that position and as stiff as the first. With
-    ``q_further``, a second spring sets in at that position, as behind a soft bumper.
+    ``q_further``, a second spring sets in at that position, as behind a soft bumper. A damper acts
+    ``one_way`` if it resists only the approach, as most shock absorbers do.
     """
 
     kind = "end_stop"
@@ -272,6 +273,8 @@ class EndStop(Effect):
         Coefficient("k", "N m/rad", sign=1),
         Coefficient("k_further", "N m/rad", sign=1),
     )
+    #: Coefficient of the product of the deflection and the speed of the approach.
+    resistance = Coefficient("d", "N m s/rad^2", sign=1)
     shapes = (
         Shape("q_lim", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
         Shape("q_low", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
@@ -288,6 +291,7 @@ class EndStop(Effect):
         {"power": 1.5, "damping": 0.5},
         {"q_low": 0.0},
         {"q_low": 0.0, "damping": 0.5},
+        {"one_way": 1.0},
     )
     simplicity = 10
     rivals = ("spring", "nonlinear_spring")
@@ -301,7 +305,7 @@ class EndStop(Effect):
             for share in (0.80, 0.84, 0.88, 0.92, 0.95)
             for side in (1.0, -1.0)
         ]
-        further, stronger, foam, *damped, _, both_damped = map(dict, self.forms)
+        further, stronger, foam, *damped, _, both_damped, one_way = map(dict, self.forms)
         some = [stops[k] for k in (2, 3, 6, 7)]
         softer = [
             stop | form | {"damping": form["damping"] / unit} for form in damped for stop in some
@@ -313,7 +317,7 @@ class EndStop(Effect):
         ]
         slowing = {"damping": both_damped["damping"] / unit}
         both += [ends | slowing for ends in both]
-        stiffer = [stop | stronger for stop in stops]
+        stiffer = [stop | stronger for stop in stops] + [stop | one_way for stop in some]
         for stop in some:
             depth = float((stop["side"] * (q - stop["q_lim"])).max())
             stiffer.append(stop | {"stiffening": foam["stiffening"] * depth})
@@ -348,11 +352,19 @@ class EndStop(Effect):
             push = np.maximum(0.0, side * (q - limit))
             push = side * (push**power if scale is None else scale * (np.exp(push / scale) - 1.0))
             torque += push * np.maximum(0.0, 1.0 + damping * side * dq) if damping else push
+        side = shape["side"]
+        if "one_way" in shape:
+            return np.column_stack([torque, torque * np.maximum(0.0, side * dq)])
         if "q_further" not in shape:
             return torque[:, None]
-        side = shape["side"]
         second = side * np.maximum(0.0, side * (q - shape["q_further"]))
         return np.column_stack([torque, second])
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
-        return self.coefficients if "q_further" in shape else self.coefficients[:1]
+        stiffness, second = self.coefficients
+        if "one_way" in shape:
+            return (stiffness, self.resistance)
+        return (stiffness, second) if "q_further" in shape else (stiffness,)
+
+    def units(self, prismatic: bool = False) -> dict[str, str]:
+        return super().units(prismatic) | {"d": "N s/m^2" if prismatic else self.resistance.unit}

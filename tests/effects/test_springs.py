@@ -140,3 +140,16 @@ def test_a_counterweight_and_its_second_harmonic(signals, columns_of):
     np.testing.assert_allclose(three[:, [2, 3]], np.column_stack([np.sin(3 * q), np.cos(3 * q)]))
     assert [c.name for c in effect.coefficients_of({"overtone": 3.0})][2:4] == ["a3", "b3"]
     np.testing.assert_allclose(two[:, 2:4], np.column_stack([np.sin(2 * q), np.cos(2 * q)]))
+
+
+def test_a_shock_absorber_resists_the_approach_only(signals, columns_of):
+    q, dq = signals.q[:, 0], signals.dq[:, 0]
+    limit = float(np.quantile(q, 0.8))
+
+    found = columns_of("end_stop", signals, q_lim=limit, side=1.0, one_way=1.0) @ [50.0, 30.0]
+
+    depth = np.maximum(0.0, q - limit)
+    np.testing.assert_allclose(found, depth * (50.0 + 30.0 * np.maximum(0.0, dq)))
+    effect = get_effect("end_stop")
+    assert [c.name for c in effect.coefficients_of({"one_way": 1.0})] == ["k", "d"]
+    assert effect.units(prismatic=True)["d"] == "N s/m^2"
