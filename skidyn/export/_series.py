@@ -81,6 +81,8 @@ def series_joints(
             reasons[term] = "it acts in some of the recordings only"
         elif not size > 0.0:
             reasons[term] = "its size is not positive"
+        elif "stiffening" in term.shape:
+            reasons[term] = "its stiffness changes with the load"
         elif place in taken:
             # Two passive joints need a body with mass between them.
             reasons[term] = f"the joint has its {taken[place]} already"

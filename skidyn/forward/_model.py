@@ -60,6 +60,11 @@ class Memory:
     law: Law
 
 
+#: Largest argument of a hyperbolic sine; and damping ratio without load of a gear that becomes
+#: stiffer, which its effect takes as quasi-static.
+STIFFEST, DAMPING_OF_STIFFENING = 30.0, 0.2
+
+
 @dataclass(frozen=True)
 class Spring:
     """Elastic element between motor and link of a joint.
@@ -74,12 +79,30 @@ class Spring:
         Damping in parallel.
     gap : float, rad
         Play between the flanks; 0 for none.
+    stiffening : float, N m
+        Torque from which the gear becomes stiffer; infinite if it does not.
     """
 
     joint: int
     stiffness: float
     damping: float
     gap: float = 0.0
+    stiffening: float = np.inf
+
+    def torque(self, twist: Array) -> Array:
+        """Elastic torque, N m, if the motor is ahead of the link by a twist in rad."""
+        bent = twist - np.clip(twist, -self.gap / 2, self.gap / 2)
+        if np.isinf(self.stiffening):
+            return np.asarray(self.stiffness * bent)
+        ratio = np.clip(self.stiffness / self.stiffening * bent, -STIFFEST, STIFFEST)
+        return np.asarray(self.stiffening * np.sinh(ratio))
+
+    def twist(self, load: Array) -> Array:
+        """How far the motor is ahead of the link under a load, rad."""
+        bent = load / self.stiffness
+        if np.isfinite(self.stiffening):
+            bent = np.arcsinh(load / self.stiffening) * self.stiffening / self.stiffness
+        return np.asarray(bent + np.sign(load) * self.gap / 2)
 
 
 @dataclass
@@ -382,8 +405,10 @@ def _elastic(forward: ForwardModel, term: Term) -> None:
             "positive one can be simulated. Fit with consistent=True, or without the effect"
         )
     stiffness = 1.0 / compliance
-    damping = 2 * term.shape["damping"] * stiffness / (2 * np.pi * term.shape["resonance"])
-    forward.springs.append(Spring(joint, stiffness, damping))
+    ratio = term.shape.get("damping", DAMPING_OF_STIFFENING)
+    damping = 2 * ratio * stiffness / (2 * np.pi * term.shape["resonance"])
+    stiffening = float(term.shape.get("stiffening", np.inf))
+    forward.springs.append(Spring(joint, stiffness, damping, stiffening=stiffening))
 
 
 def _loose(forward: ForwardModel, term: Term) -> None:

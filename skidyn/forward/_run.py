@@ -183,8 +183,7 @@ def _start(forward: ForwardModel, signals: Signals, first: Rows, stepper: Steppe
         given = q[None, :, : forward.n], dq[None, :, : forward.n], ddq[None], direction[None]
         _, rigid = forward.torque(*given, memory[None], stepper.conditions, stepper.theta)[:, 0]
         load = rigid[:, spring.joint]
-        twist = load / spring.stiffness + np.sign(load) * spring.gap / 2
-        q = np.column_stack([q, q[:, spring.joint] - twist])
+        q = np.column_stack([q, q[:, spring.joint] - spring.twist(load)])
         dq = np.column_stack([dq, dq[:, spring.joint]])
     return State(q.copy(), dq.copy(), direction, memory)
 

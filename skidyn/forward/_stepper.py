@@ -126,9 +126,8 @@ class Stepper:
         for k, spring in enumerate(forward.springs):
             j = spring.joint
             twist, rate = q[..., j] - q[..., n + k], v[..., j] - v[..., n + k]
-            free = np.clip(twist, -spring.gap / 2, spring.gap / 2)
-            touching = (twist != free) | (spring.gap == 0.0)
-            torque = spring.stiffness * (twist - free) + spring.damping * rate * touching
+            touching = (np.abs(twist) > spring.gap / 2) | (spring.gap == 0.0)
+            torque = spring.torque(twist) + spring.damping * rate * touching
             result[..., j] += torque - moved[..., j]
             result[..., n + k] = moved[..., j] - torque
         return result

@@ -44,6 +44,7 @@ MJCF = """<mujoco>
 </mujoco>
 """
 ELASTIC = Term("joint_elasticity", (2,), {"resonance": 12.0, "damping": 0.1})
+STIFFENING = Term("joint_elasticity", (2,), {"resonance": 12.0, "stiffening": 1.0})
 LOOSE = Term("backlash", (2,), {"gap": 0.04})
 
 
@@ -227,6 +228,7 @@ def test_effects_without_a_joint_are_left_with_a_reason(robot, merged, tmp_path)
         (model_of(robot, ELASTIC, size=-1e-3), MJCF, "not positive"),
         (model_of(robot, LOOSE, ELASTIC), MJCF, "has its backlash already"),
         (model_of(robot, ELASTIC), keyed, "keyframe 'home'"),
+        (model_of(robot, STIFFENING), MJCF, "changes with the load"),
     ]
     for model, text, reason in cases:
         _, left, _ = merged(model, text)

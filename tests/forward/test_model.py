@@ -56,3 +56,18 @@ def test_elastic_link_swings_at_its_resonance(slider, log_of, moved):
     crossings = np.flatnonzero((free[:-1] < 0) & (free[1:] >= 0))
     period = np.diff(time[crossings[crossings > 20]]).mean()
     np.testing.assert_allclose(1 / period, 5.0 * np.sqrt(3.0), rtol=0.02)
+
+
+def test_a_gear_that_becomes_stiffer_gives_way_less(slider, log_of, moved):
+    """A force of 10 N on a motor of 1 kg, whose link of 2 kg lags behind by the wind-up."""
+    stiffness, stiffening = 2.0 * (2 * np.pi * 5.0) ** 2, 2.0
+    term = Term("joint_elasticity", (1,), {"resonance": 5.0, "stiffening": stiffening})
+    sizes = {"joint_elasticity": [1 / stiffness], "rotor_inertia": [1.0]}
+    model = slider([term, "rotor_inertia"], sizes)
+    time = np.linspace(0, 2, 2001)
+    X, y = log_of(model.robot_, [0.0], [0.0], lambda t, j: 10.0 + 0 * t, time)
+    q, _ = moved(model, X, y)
+    center = 0.5 * (10.0 / 3.0) * time**2
+    wound_up = stiffening / stiffness * np.arcsinh(10.0 * 2 / 3 / stiffening)
+    np.testing.assert_allclose(q[-200:, 0] - center[-200:], 2 / 3 * wound_up, rtol=0.1)
+
