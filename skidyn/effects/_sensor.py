@@ -18,7 +18,8 @@ class TorqueGain(Effect):
     """The logged torque is too large or too small by a factor.
 
     With a ``sign`` in its shape this holds only for positive (1) or negative torque (-1), as for a
-    fault in one half of a bridge or of an amplifier.
+    fault in one half of a bridge or of an amplifier. With ``over_speed`` the factor changes with
+    the speed of the joint, as where the voltage for the current is no longer sufficient.
     """
 
     kind = "torque_gain"
@@ -26,7 +27,9 @@ class TorqueGain(Effect):
     title = "Torque gain"
     formula = r"\varepsilon\,\tau_\mathrm{model}"
     coefficients = (Coefficient("epsilon", "1"),)
-    forms = ({"sign": 1.0}, {"sign": -1.0})
+    #: Change of the factor per speed.
+    per_speed = Coefficient("epsilon_speed", "s/rad")
+    forms = ({"sign": 1.0}, {"sign": -1.0}, {"over_speed": 1.0})
     needs = ("model_torque",)
     by_recording = True
     drifts = True
@@ -38,8 +41,16 @@ class TorqueGain(Effect):
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.model_torque is not None
         torque = signals.model_torque[:, [joint]]
+        if "over_speed" in shape:
+            return np.hstack([torque, torque * np.abs(signals.dq[:, [joint]])])
         sign = shape.get("sign")
         return torque if sign is None else sign * np.maximum(0.0, sign * torque)
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        return (*self.coefficients, self.per_speed) if "over_speed" in shape else self.coefficients
+
+    def units(self, prismatic: bool = False) -> dict[str, str]:
+        return super().units(prismatic) | {"epsilon_speed": "s/m" if prismatic else "s/rad"}
 
 
 #: Share of a sampling step within which the values of a row may have been taken.

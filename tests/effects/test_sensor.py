@@ -62,3 +62,14 @@ def test_a_long_delay_is_a_difference_from_an_earlier_torque(signals):
     short = get_effect("time_delay").torque_columns(signals, (0,), shift=1e-3)[0]
     plain = get_effect("time_delay").torque_columns(signals, (0,))[0]
     np.testing.assert_allclose(short[inner], plain[inner], atol=0.05)  # of one step
+
+
+def test_a_gain_may_change_with_the_speed(signals):
+    effect = get_effect("torque_gain")
+
+    found = effect.columns(signals, 1, over_speed=1.0) @ [0.1, -0.02]
+
+    factor = 0.1 - 0.02 * np.abs(signals.dq[:, 1])
+    np.testing.assert_allclose(found, factor * signals.model_torque[:, 1])
+    names = [c.name for c in effect.coefficients_of({"over_speed": 1.0})]
+    assert [effect.units()[name] for name in names] == ["1", "s/rad"]
