@@ -280,6 +280,8 @@ class RankingSearch(RecordingSearch):
         for split in splits:
             if split.drop.sum() > 0:
                 candidate = self._carried(split.candidate)
+                if not self.can_be(candidate, self.chosen):
+                    continue
                 own = self.with_own_sizes(candidate) if split.apart else [candidate]
                 found.append((own, -float(split.drop.sum()) + 2 * sum(c.width for c in own)))
         return found

@@ -37,7 +37,9 @@ class RecordingSearch(SearchState):
 
     def can_be(self, candidate: Candidate, others: Sequence[Candidate]) -> bool:
         """Whether a candidate's coefficients, together with others, are physically possible."""
-        return candidate.allows(self.tester(others).test(candidate.rows).coefficients)
+        size = self.tester(others).test(candidate.rows).coefficients
+        term = candidate.term
+        return candidate.allows(size) and term.effect.can_have(size, term.shape, self.problem.few)
 
     def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
         """Effects of few recordings as known effects, those of many recordings as unknown.

@@ -255,6 +255,25 @@ class Effect:
         """
         return self.coefficients
 
+    def can_have(self, coefficients: Array, shape: Mapping[str, Any], signals: Signals) -> bool:
+        """Whether coefficients are those of this effect, and not of another one.
+
+        Parameters
+        ----------
+        coefficients : ndarray of shape (n_coefficients,)
+            Fitted values.
+        shape : mapping
+            Shape parameters.
+        signals : Signals
+            Motion and robot.
+
+        Returns
+        -------
+        bool
+            True by default.
+        """
+        return True
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         """Columns of the effect on its own joint.
 

@@ -94,6 +94,10 @@ _LEAST_TURN = 0.05
 FARTHEST = 5.0
 
 
+#: Least share of a force that is across gravity for it not to be a weight.
+LEAST_ASIDE = 0.2
+
+
 class _ToolEffect(Effect):
     scope = "robot"
     needs = ("robot",)
@@ -243,6 +247,16 @@ class ExternalWrench(_ToolEffect):
             return self.coefficients
         products = [Coefficient(f"{a}f{b}", "N m") for a in "xyz" for b in "xyz"]
         return (*self.coefficients[:3], *products)
+
+    def can_have(self, coefficients: Array, shape: Mapping[str, Any], signals: Signals) -> bool:
+        assert signals.robot is not None
+        size = float(np.linalg.norm(signals.robot.gravity))
+        if "arm" not in shape or size == 0:
+            return True
+        # A weight on a point that turns with the tool is a payload.
+        down = signals.robot.gravity / size
+        aside = coefficients[:3] - (coefficients[:3] @ down) * down
+        return bool(np.linalg.norm(aside) > LEAST_ASIDE * np.linalg.norm(coefficients[:3]))
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None

@@ -211,3 +211,17 @@ def test_a_ball_that_the_tool_presses_into_is_found_with_its_size():
     assert finding.parameters["radius"]["value"] == pytest.approx(radius, rel=0.1)
     assert finding.parameters["k"]["value"] == pytest.approx(2000.0, rel=0.2)
     assert "The surface is a ball." in finding.sentence
+
+
+def test_a_weight_on_a_point_that_turns_with_the_tool_is_a_payload_and_no_force():
+    q = np.zeros((10, 3))
+    signals = Signals(q, q, q, trajectory=np.zeros(10, dtype=int), robot=with_tool())
+    effect = get_effect("external_wrench")
+
+    def can_be(force, **shape):
+        coefficients = np.concatenate([force, np.outer(AT, force).ravel()])
+        return effect.can_have(coefficients, shape, signals)
+
+    assert not can_be([0.1, 0.0, -4.0], arm=1.0)
+    assert can_be([2.0, 0.0, -4.0], arm=1.0)
+    assert can_be([0.1, 0.0, -4.0])
