@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._hypothesis import SearchResult, terms_on_rows
 from skidyn.diagnosis._rule import (
     REVERSAL_AWAY,
@@ -79,7 +80,11 @@ def look_at_reversals(
     wider.torque = problem.torque - result.ripple
     gates = replace(settings, least_share=REVERSAL_LEAST_SHARE, max_findings=room)
     given = problem.terms
-    second = search(wider, family, gates, nameless=False, joints=joints, given=given)
+
+    def among(candidate: Candidate) -> bool:
+        return set(candidate.joints) <= set(joints)
+
+    second = search(wider, family, gates, nameless=False, among=among, given=given)
     if not new & {j for h in second.findings for j in h.joints}:
         return problem, result
     wider = replace(wider, terms=problem.terms, torque=problem.torque)

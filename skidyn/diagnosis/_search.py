@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -22,7 +22,7 @@ def search(
     *,
     nameless: bool = True,
     vibration: bool = True,
-    joints: Sequence[int] | None = None,
+    among: Callable[[Candidate], bool] | None = None,
     earlier: Sequence[Hypothesis] = (),
     given: Iterable[Term] = (),
 ) -> SearchResult:
@@ -40,8 +40,8 @@ def search(
         Whether unknown functions of the signals are candidates.
     vibration : bool, default=True
         Whether a wave in time is one of them.
-    joints : sequence of int, optional
-        Joints, from 0, on which effects are tried; all by default.
+    among : callable, optional
+        Whether a candidate of the catalogue is tried; all, and functions of signals, by default.
     earlier : sequence of Hypothesis, optional
         Findings of another search, whose terms are in the model: what removes little of what they
         removed may be an error of their formulas.
@@ -50,8 +50,8 @@ def search(
     """
     searcher = _Search(problem, kinds, settings, nameless)
     searcher.vibration &= vibration
-    if joints is not None:
-        searcher.pool = [c for c in searcher.pool if set(c.joints) <= set(joints)]
+    if among is not None:
+        searcher.pool = list(filter(among, searcher.pool))
         searcher.nameless = False
     searcher.earlier = [*_as_found(problem, given), *earlier]
     return searcher.run()

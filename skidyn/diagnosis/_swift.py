@@ -17,9 +17,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._hypothesis import Hypothesis, SearchResult, terms_on_rows
 from skidyn.diagnosis._noise import sensor_noise
 from skidyn.diagnosis._remainder import position_noise
@@ -80,11 +82,10 @@ def look_at_swift(
         size = settings.size_share_short
         gates = replace(settings, max_findings=room, least_gain=least, size_share=size)
         slowed = {j for h in slow for c in h.candidates if c.term.effect.is_slow for j in c.joints}
-        joints = [j for j in range(problem.n_joints) if j not in slowed]
+        moving = [h for h in result.findings if h.kind in family]
+        among = partial(_is_tried, slowed=slowed, known=moving)
         given = problem.terms
-        moved = search(
-            short, family, gates, nameless=False, joints=joints, earlier=slow, given=given
-        )
+        moved = search(short, family, gates, nameless=False, among=among, earlier=slow, given=given)
         now = {j: h.kind for h in moved.findings for j in h.joints}
         fastest = [
             c.term.effect.fastest(c.term.shape) for h in moved.findings for c in h.candidates
@@ -114,6 +115,19 @@ def look_at_swift(
         ripple=others.ripple,
         candidates=result.candidates,
     )
+
+
+def _is_tried(candidate: Candidate, slowed: set[int], known: Sequence[Hypothesis]) -> bool:
+    """Whether an effect is searched in short windows, where some slow ones are known.
+
+    Noise of accelerations resembles a form without an oscillation, so that it must have been found
+    in long windows, too.
+    """
+    slow = candidate.term.effect.without_swing & set(candidate.term.shape)
+    found = any(
+        slow <= set(c.term.shape) for h in known for c in h.candidates if c.site == candidate.site
+    )
+    return not slowed & set(candidate.joints) and (not slow or found)
 
 
 def _sites(findings: Sequence[Hypothesis]) -> set[tuple[str, tuple[int, ...]]]:

@@ -94,6 +94,9 @@ class Effect:
     follows_acceleration : bool
         Whether it resembles the noise of accelerations in short averages, so that it is not
         searched there if positions are coarse.
+    without_swing : frozenset of str
+        Entries of the shape of a form that moves the link without an oscillation, which noise of
+        accelerations resembles in short averages.
     is_slow : bool
         Whether the formula is valid for slow changes only, so that no fast effect is reported
         together with it, and its other forms are tried whatever it leaves.
@@ -149,6 +152,7 @@ class Effect:
     is_exact: ClassVar[bool] = False
     moves_link: ClassVar[bool] = False
     follows_acceleration: ClassVar[bool] = False
+    without_swing: ClassVar[frozenset[str]] = frozenset()
     is_slow: ClassVar[bool] = False
     simplicity: ClassVar[int] = 50
     rivals: ClassVar[tuple[str, ...]] = ()

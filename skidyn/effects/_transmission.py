@@ -297,6 +297,7 @@ class JointElasticity(_LinkSideEffect):
     )
     #: As a share of the root mean square of the load.
     forms = ({"stiffening": 0.5},)
+    without_swing = frozenset({"stiffening"})
     follows_acceleration = True
     simplicity = 19
     rivals = ("time_delay", "rotor_inertia", "backlash", "base_tilt")
