@@ -18,6 +18,8 @@ HARMONICS = 5
 #: Fewest waves within the motion, of which fewer can represent any function of the position, and
 #: most, of which more are lines in a spectrum; step between those that are tried.
 FEWEST, MOST, STEP = 2.5, 24.0, 0.1
+#: Share of what waves explain that fewer harmonics of the same waves may leave.
+SAME = 0.02
 #: Least difference of the numbers of two waves within the motion.
 APART = 0.7
 #: Least share of the residual of a joint that the waves explain.
@@ -90,7 +92,16 @@ def _best_shape(q: Array, r: Array) -> dict[str, float] | None:
         near = min(waves) < FEWEST or abs(waves[0] - waves[1]) < APART
         return np.inf if near else left(wave(waves[0]), wave(waves[1]))
 
-    first, harmonic = _best(lambda waves: left(wave(waves, HARMONICS)))
+    def repeated(waves: float) -> float:
+        return left(wave(waves, HARMONICS))
+
+    first, harmonic = _best(repeated)
+    # Waves of half the number explain at least as much.
+    for order in (2, 3):
+        whole, other = _near(repeated, order * first)
+        if whole < MOST and other < harmonic + SAME * (float(y @ y) - harmonic):
+            first, harmonic = whole, other
+            break
     one, _ = _best(lambda waves: left(wave(waves)))
     two, _ = _best(lambda waves: both(np.array([one, waves])))
     found = minimize(both, [one, two], method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 0})
@@ -105,8 +116,12 @@ def _best_shape(q: Array, r: Array) -> dict[str, float] | None:
 def _best(left: Callable[[float], float]) -> tuple[float, float]:
     """The number of waves that leaves least, and what it leaves."""
     tried = np.arange(FEWEST, MOST, STEP).tolist()
-    best = min(tried, key=left)
-    bounds = max(FEWEST, best - STEP), best + STEP
+    return _near(left, min(tried, key=left))
+
+
+def _near(left: Callable[[float], float], waves: float) -> tuple[float, float]:
+    """The best number of waves near one, and what it leaves."""
+    bounds = max(FEWEST, waves - STEP), waves + STEP
     found = minimize_scalar(left, bounds=bounds, method="bounded")
     return float(found.x), float(found.fun)
 

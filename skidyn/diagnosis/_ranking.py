@@ -35,6 +35,7 @@ from skidyn.diagnosis._rule import (
     HARMONIC,
     MASKED,
     NEARLY,
+    NO_SINE,
     RESOLVED,
     ROUNDS,
 )
@@ -429,7 +430,11 @@ class RankingSearch(RecordingSearch):
         if "torque_ripple" in self.kinds:
             lines = find_lines(problem, residual, self.significant)
             free = [j for j in range(problem.n_joints) if not self._harmonic(j)]
-            lines += find_periodic(problem, residual, free, self.significant)
+            plain = {
+                j: max((n.gain.sum() for n in lines if n.joint == j), default=0.0) for j in free
+            }
+            for line in find_periodic(problem, residual, free, self.significant):
+                lines += [line] if line.gain.sum() > NO_SINE * plain[line.joint] else []
             lines = list(filter(self._is_ripple, lines))
             shortest = 1.0 / problem.signals.unit.max()
             found.append(self._of_lines("torque_ripple", "N", shortest, lines, least))

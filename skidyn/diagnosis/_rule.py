@@ -69,6 +69,8 @@ FEW_WAVES = 4.0
 #: Distance of the order of a wave from a whole number within which it is a harmonic of a ripple
 #: that was found before.
 HARMONIC = 0.03
+#: Multiple of the log-likelihood that the best sine gains from which ripple has another form.
+NO_SINE = 1.1
 #: A column of which less than this share is new to the model is not tested.
 NEW_SHARE = 1e-6
 #: Relative rounding error of what a column removes, found from products.
