@@ -430,11 +430,11 @@ class RankingSearch(RecordingSearch):
         if "torque_ripple" in self.kinds:
             lines = find_lines(problem, residual, self.significant)
             free = [j for j in range(problem.n_joints) if not self._harmonic(j)]
-            plain = {
-                j: max((n.gain.sum() for n in lines if n.joint == j), default=0.0) for j in free
-            }
-            for line in find_periodic(problem, residual, free, self.significant):
-                lines += [line] if line.gain.sum() > NO_SINE * plain[line.joint] else []
+            sines = np.zeros(problem.n_joints)
+            for line in lines:
+                sines[line.joint] = max(sines[line.joint], line.gain.sum())
+            periodic = find_periodic(problem, residual, free, self.significant)
+            lines += [own for own in periodic if own.gain.sum() > NO_SINE * sines[own.joint]]
             lines = list(filter(self._is_ripple, lines))
             shortest = 1.0 / problem.signals.unit.max()
             found.append(self._of_lines("torque_ripple", "N", shortest, lines, least))
