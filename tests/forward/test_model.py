@@ -70,4 +70,3 @@ def test_a_gear_that_becomes_stiffer_gives_way_less(slider, log_of, moved):
     center = 0.5 * (10.0 / 3.0) * time**2
     wound_up = stiffening / stiffness * np.arcsinh(10.0 * 2 / 3 / stiffening)
     np.testing.assert_allclose(q[-200:, 0] - center[-200:], 2 / 3 * wound_up, rtol=0.1)
-
