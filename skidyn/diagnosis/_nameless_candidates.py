@@ -52,7 +52,6 @@ def nameless_candidates(
     """
     # slow to import, not needed to check a log, and before processes that would all import them
     import scipy.signal  # noqa: F401
-    import sklearn.ensemble  # noqa: F401
 
     looked_at = range(problem.n_joints) if followed_on is None else followed_on
 

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sets of one to three signals of which a function of any form predicts a residual.
+
+A function of a signal is a sum of hats (linear between knots at its quantiles), and one of several
+signals a sum of products of their hats. Every signal, every pair of signals of near joints, and the
+best pairs with a third signal are fitted to all folds but one at a time; the set that predicts the
+folds left out best is the set on which the residual depends. Held-out errors need only the products
+of the columns within each fold.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidyn._signals import Array
+from skidyn.diagnosis._signal_products import LEAST_SHARE, predictable
+
+#: Most rows that are used.
+MOST_ROWS = 1000
+#: Knots of the hats of each signal of a set of one, two and three.
+KNOTS = (8, 6, 4)
+#: Penalty of the squared coefficients, relative to the mean square of a column.
+RIDGE = 0.1
+#: Number of the best pairs to which a third signal is added.
+PAIRS = 3
+#: Singular values of the hats below this share of the largest are left out.
+RESOLVED = 1e-6
+
+#: Number of sets whose columns are held at once.
+AT_ONCE = 32
+
+#: Names of signals.
+Names = tuple[str, ...]
+
+
+def sets_of_signals(
+    signals: dict[str, Array], y: Array, fold: NDArray[np.int64], near: Collection[str]
+) -> list[Names]:
+    """The best set of one, of two and of three signals, as far as each predicts more.
+
+    Parameters
+    ----------
+    signals : dict of str to ndarray of shape (n_rows,)
+        By name.
+    y : ndarray of shape (n_rows,)
+        Residual, N m or N.
+    fold : ndarray of shape (n_rows,)
+        Fold of every row, from 0.
+    near : collection of str
+        Signals of which all pairs are tried; others only with the best single one.
+
+    Returns
+    -------
+    list of tuple of str
+        Up to three sets, fewest signals first; empty if none predicts the residual.
+    """
+    step = max(1, -(-len(y) // MOST_ROWS))
+    moving = {name: x[::step] for name, x in signals.items() if np.ptp(x[::step]) > 0}
+    if not moving:
+        return []
+    y, fold = y[::step] - y[::step].mean(), fold[::step]
+    parts = [np.flatnonzero(fold == f) for f in np.unique(fold)]
+    singles = _ranked([(name,) for name in moving], moving, y, parts)
+    first = singles[0][0][0]
+    close = [name for name in moving if name in near]
+    others = [name for name in moving if name != first and not {name, first} <= {*close}]
+    sets = [*itertools.combinations(close, 2), *((first, name) for name in others)]
+    pairs = _ranked(sets, moving, y, parts)
+    more = {frozenset((*pair, name)) for pair, _ in pairs[:PAIRS] for name in moving}
+    triples = _ranked(sorted(tuple(sorted(s)) for s in more if len(s) == 3), moving, y, parts)
+    found: list[Names] = []
+    energy = before = np.array([y[rows] @ y[rows] for rows in parts])
+    for names, left in (ranked[0] for ranked in (singles, pairs, triples) if ranked):
+        if predictable(energy, left) and left.sum() < (1 - LEAST_SHARE) * before.sum():
+            found.append(tuple(sorted(names)))
+            before = left
+    return found
+
+
+def _ranked(
+    sets: Sequence[Names], signals: dict[str, Array], y: Array, parts: Sequence[NDArray[np.int64]]
+) -> list[tuple[Names, Array]]:
+    """Sets of equally many signals with their held-out error of every fold, least error first."""
+    if not sets:
+        return []
+    hats = {name: _hats(x, KNOTS[len(sets[0]) - 1]) for name, x in signals.items()}
+    left: list[Array] = []
+    for start in range(0, len(sets), AT_ONCE):
+        some = [[hats[name] for name in names] for names in sets[start : start + AT_ONCE]]
+        left.extend(errors_of_folds(np.stack([*map(_products, some)]), y, parts, RIDGE))
+    return sorted(zip(sets, left, strict=True), key=lambda item: float(item[1].sum()))
+
+
+def errors_of_folds(
+    blocks: Array, y: Array, parts: Sequence[NDArray[np.int64]], ridge: float
+) -> Array:
+    """Squared error of every fold with the fit of a block of columns to all others.
+
+    Parameters
+    ----------
+    blocks : ndarray of shape (n_blocks, n_rows, k)
+        Columns; each block is fitted alone.
+    y : ndarray of shape (n_rows,)
+        What is fitted.
+    parts : sequence of ndarray of int
+        Rows of every fold.
+    ridge : float
+        Penalty of the squared coefficients, as a share of the number of rows.
+
+    Returns
+    -------
+    ndarray of shape (n_blocks, n_folds)
+    """
+    inside = [blocks[:, rows] for rows in parts]
+    own = np.array([a.transpose(0, 2, 1) @ a for a in inside])
+    along = np.array([y[rows] @ a for a, rows in zip(inside, parts, strict=True)])
+    energy = np.array([y[rows] @ y[rows] for rows in parts])
+    penalty = ridge * len(y) * np.eye(blocks.shape[2])
+    weights = solved(own.sum(0) - own + penalty, along.sum(0) - along)
+    left = energy[:, None] - 2 * np.einsum("fbk,fbk->fb", weights, along)
+    left += np.einsum("fbk,fbkl,fbl->fb", weights, own, weights, optimize=True)
+    return np.asarray(left.T)
+
+
+def solved(gram: Array, right: Array) -> Array:
+    """Solutions of many small systems.
+
+    Parameters
+    ----------
+    gram : ndarray of shape (..., k, k)
+    right : ndarray of shape (..., k)
+
+    Returns
+    -------
+    ndarray of shape (..., k)
+    """
+    return np.asarray(np.linalg.solve(gram, right[..., None])[..., 0])
+
+
+def _hats(x: Array, count: int) -> Array:
+    """Hats of a signal as orthogonal columns of mean square 1, or zero, shape (n_rows, count)."""
+    knots = np.unique(np.quantile(x, np.linspace(0.0, 1.0, count)))
+    hats = [np.interp(x, knots, hat) for hat in np.eye(len(knots))]
+    left, size, _ = np.linalg.svd(np.column_stack(hats), full_matrices=False)
+    columns = np.zeros((len(x), count))
+    columns[:, : len(knots)] = left * np.sqrt(len(x)) * (size > RESOLVED * size[0])
+    return columns
+
+
+def _products(hats: Sequence[Array]) -> Array:
+    """All products of one column of each, shape (n_rows, n_products)."""
+    columns = hats[0]
+    for other in hats[1:]:
+        columns = (columns[:, :, None] * other[:, None, :]).reshape(len(columns), -1)
+    return columns
