@@ -3,12 +3,14 @@
 
 A value that is held changes in every n-th row only, a line bends in every n-th row only, and a
 cubic spline has a new third derivative there. So the size of the differences of the torque depends
-on the number of the row modulo n, which no motion, friction or noise can cause.
+on the number of the row modulo n, which no motion, friction or noise can cause. A wave of constant
+frequency can, such as hum of the mains in a sensor, if a multiple of its half period is n rows:
+what is left without such waves must show it, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 import numpy as np
 
@@ -30,6 +32,8 @@ SURE, AGREEING, TIMES = 40.0, 0.6, 1.7
 UNEVEN = 0.01
 #: Fewest differences of each phase, and least size of them as a share of the spread of the torque.
 FEWEST, ROUNDING = 30, 1e-9
+#: Degree of the polynomial of time by which the amplitude and phase of a wave may change.
+CHANGES = 2
 
 
 class SlowTorque(Check):
@@ -47,7 +51,8 @@ class SlowTorque(Check):
         for order, table in tables:
             most = _best([(period, _total(own)) for period, own in table])
             alike = {k: one for k, one in dict(table).get(most, {}).items() if one[0] > 0}
-            if _shows(alike) and len(alike) >= AGREEING * sum(measurement.excited):
+            agree = len(alike) >= AGREEING * sum(measurement.excited)
+            if agree and _shows(alike) and _shows(_without_waves(measurement, order, most, alike)):
                 measurement.stale = True
                 gained = f"equally on {len(alike)} joints, which improves"
                 yield self._of(measurement, order, most, alike, "the torque", gained)
@@ -57,7 +62,7 @@ class SlowTorque(Check):
             for k in joints:
                 most = _best([(period, own[k][0]) for period, own in table])
                 alone = {k: dict(table)[most][k]} if most else {}
-                if _shows(alone):
+                if _shows(alone) and _shows(_without_waves(measurement, order, most, alone)):
                     measurement.slow.add(k)
                     torque = f"the torque of {measurement.joint(k)}"
                     yield self._of(measurement, order, most, alone, torque, "which improves")
@@ -105,8 +110,20 @@ def _best(gains: list[tuple[int, float]]) -> int:
     return best
 
 
+def _without_waves(
+    measurement: Measurement, order: int, period: int, joints: Collection[int]
+) -> dict[int, tuple[float, float]]:
+    """What differences of some joints, from 0, gain by a period without waves that repeat in it."""
+    ((_, own),) = _periods(measurement, order, [period], without_waves=True)
+    return {k: own[k] for k in joints}
+
+
 def _periods(
-    measurement: Measurement, order: int
+    measurement: Measurement,
+    order: int,
+    periods: Iterable[int] = PERIODS,
+    *,
+    without_waves: bool = False,
 ) -> list[tuple[int, dict[int, tuple[float, float]]]]:
     """What the differences of the torque of every joint, from 0, gain by every period.
 
@@ -117,22 +134,19 @@ def _periods(
     s, spread = measurement.signals, np.std(measurement.torque, axis=0)
     joints = np.flatnonzero(measurement.excited & (spread > 0))
     torque, rounding = measurement.torque[:, joints], ROUNDING * spread[joints]
-    parts = [
-        np.log(np.abs(divided_differences(torque[rows], s.clock[rows], order)) + rounding)
+    differences = [
+        divided_differences(torque[rows], s.clock[rows], order)
         for rows in s.segments
         if rows.stop - rows.start > 4 * FEWEST and _is_even(s.clock[rows])
     ]
-    parts = [part - part.mean(axis=0) for part in parts]  # for squares without cancellation
-    squares = [np.sum(part**2, axis=0) for part in parts]
     found: list[tuple[int, dict[int, tuple[float, float]]]] = []
-    if not len(joints) or max(map(len, parts), default=0) < 4 * FEWEST:
+    if not len(joints) or max(map(len, differences), default=0) < 4 * FEWEST:
         return found
-    for period in PERIODS:
-        sizes = [
-            _sizes(part, square, period)
-            for part, square in zip(parts, squares, strict=True)
-            if len(part) >= period * FEWEST
-        ]
+    parts = [_logarithms(own, rounding) for own in differences]
+    for period in periods:
+        if without_waves:
+            parts = [_logarithms(own - _waves(own, period), rounding) for own in differences]
+        sizes = [_sizes(part, period) for part in parts if len(part) >= period * FEWEST]
         if not sizes:
             continue
         counts = np.array([n for _, n, _ in sizes])
@@ -151,21 +165,39 @@ def _is_even(clock: Array) -> bool:
     return bool(np.mean(np.abs(steps - usual) > 0.5 * usual) <= UNEVEN)
 
 
-def _sizes(logs: Array, square: Array, period: int) -> tuple[Array, int, Array]:
+def _logarithms(differences: Array, rounding: Array) -> Array:
+    """Logarithms of the sizes of differences, less their mean for squares without cancellation."""
+    logs = np.log(np.abs(differences) + rounding)
+    return np.asarray(logs - logs.mean(axis=0))
+
+
+def _waves(differences: Array, period: int) -> Array:
+    """The part of differences, (n_rows, n_joints), whose square repeats after a number of rows.
+
+    It is the sum of all waves of which the period, or half of it, is that number of rows or a whole
+    part of it; their amplitudes and phases may change slowly.
+    """
+    row = np.arange(len(differences))
+    phase = np.pi * np.outer(row, np.arange(1, period + 1)) / period
+    waves = np.hstack([np.cos(phase), np.sin(phase)])
+    slow = np.polynomial.legendre.legvander(2 * row / max(len(row) - 1, 1) - 1, CHANGES)
+    columns = (waves[:, :, None] * slow[:, None, :]).reshape(len(row), -1)
+    return np.asarray(columns @ np.linalg.lstsq(columns, differences, rcond=None)[0])
+
+
+def _sizes(logs: Array, period: int) -> tuple[Array, int, Array]:
     """Mean logarithms by phase, their number, and what phases gain.
 
     Parameters
     ----------
     logs : ndarray of shape (n_differences, n_joints)
         Logarithms of the sizes of differences, less their mean.
-    square : ndarray of shape (n_joints,)
-        Sum of their squares.
     period : int
         Number of phases.
     """
     count = len(logs) // period * period
     means = logs[:count].reshape(-1, period, logs.shape[1]).mean(axis=0)
-    total = (square - np.sum(logs[count:] ** 2, axis=0)) / count - means.mean(axis=0) ** 2
+    total = np.mean(logs[:count] ** 2, axis=0) - means.mean(axis=0) ** 2
     within = total - means.var(axis=0)
     gain = 0.5 * count * np.log(np.maximum(total, 1e-12) / np.maximum(within, 1e-12))
     # one phase and size of every recording that is fitted

@@ -62,6 +62,16 @@ def test_torque_of_one_joint_from_a_slower_bus_is_told_alone(step):
     assert told[0].check in ("held_torque", "slow_torque")
 
 
+@pytest.mark.parametrize("share_of_rate", [0.375, 0.2])
+def test_hum_is_no_slower_bus_where_its_period_is_a_number_of_rows(share_of_rate):
+    """Waves of the mains, sampled eight times in three periods, bend alike in every fourth row."""
+    frame = FRAME.copy()
+    row = frame.groupby("trajectory").cumcount()
+    for k, size in (("tau1", 0.2), ("tau2", 0.1)):
+        frame[k] += size * np.std(frame[k]) * np.cos(2 * np.pi * (share_of_rate + 1e-4) * row)
+    assert "slow_torque" not in {s.check for s in check_log(frame, ROBOT).checks}
+
+
 def test_torque_that_was_measured_in_every_row():
     assert told_of() == {}
 
