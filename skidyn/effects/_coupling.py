@@ -215,8 +215,8 @@ class CouplingSpring(_PairEffect):
     a ``power`` of the distance from it, with coordinates in units of 1 rad or 1 m so that the unit
     of the stiffness is the same; or a distance from ``x0`` beyond which it stiffens as a hyperbolic
     sine (``stiffening``) or softens as a hyperbolic tangent (``softening``). A cable or hose that
-    can only pull acts on one ``side`` of ``x0``; with ``bent``, it has another stiffness beyond
-    ``x0``.
+    can only pull acts on one ``side`` of ``x0``; with ``slack``, it acts beyond this distance on
+    both sides, and with ``bent``, it has another stiffness beyond ``x0``.
     """
 
     kind = "coupling_spring"
@@ -233,6 +233,7 @@ class CouplingSpring(_PairEffect):
         Shape("power", "1", (), 1.2, 5.0, scales=False),
         Shape("stiffening", "rad", (), 0.05, 2.0),
         Shape("softening", "rad", (), 0.05, 2.0),
+        Shape("slack", "rad", (), 0.01, 2.0),
     )
     forms = (
         {"x0": 0.0, "power": 3.0},
@@ -240,6 +241,7 @@ class CouplingSpring(_PairEffect):
         {"x0": 0.0, "softening": 0.4},
         {"x0": 0.0, "side": 1.0},
         {"x0": 0.0, "side": -1.0},
+        {"x0": 0.0, "slack": 0.3},
         {"x0": 0.0, "bent": 1.0},
     )
     simplicity = 16
@@ -262,8 +264,9 @@ class CouplingSpring(_PairEffect):
         if "x0" not in shape:
             return True
         x = self._stretch(signals, joints, shape)
-        # the slack position is within the log
-        return bool(x.min() < 0 < x.max()) and self._finite(signals, joints, shape)
+        # the slack position, and motion beyond it on both sides, are within the log
+        slack = shape.get("slack", 0.0)
+        return bool(x.min() < -slack and slack < x.max()) and self._finite(signals, joints, shape)
 
     def _finite(self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]) -> bool:
         x = self._stretch(signals, joints, shape)
@@ -286,6 +289,8 @@ class CouplingSpring(_PairEffect):
             force = form["softening"] * np.tanh(x / form["softening"])
         elif "side" in form:
             force = form["side"] * np.maximum(form["side"] * x, 0.0)
+        elif "slack" in form:
+            force = np.maximum(x - form["slack"], 0.0) + np.minimum(x + form["slack"], 0.0)
         elif "bent" in form:
             return np.column_stack([x, np.maximum(x, 0.0), np.ones_like(x)])
         else:

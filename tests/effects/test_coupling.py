@@ -135,6 +135,19 @@ def test_a_cable_between_two_joints_only_pulls(signals):
         np.testing.assert_allclose(columns[1], 0.5 * columns[0])
 
 
+def test_a_coupling_with_slack_pulls_beyond_it_on_both_sides(signals):
+    effect, x = get_effect("coupling_spring"), signals.q[:, 0] + 0.5 * signals.q[:, 1]
+    rest, reach = float(x.min() + x.max()) / 2, float(np.ptp(x)) / 2
+    shape = {"ratio": 0.5, "x0": rest, "slack": 0.4 * reach}
+    columns = effect.torque_columns(signals, (0, 1), **shape)
+    beyond = np.abs(x - rest) - 0.4 * reach
+    expected = np.sign(x - rest) * np.maximum(beyond, 0.0)
+    np.testing.assert_allclose(columns[0][:, 0], expected, atol=1e-12)
+    np.testing.assert_allclose(columns[1], 0.5 * columns[0])
+    assert effect.admissible(signals, (0, 1), shape)
+    assert not effect.admissible(signals, (0, 1), shape | {"slack": 1.1 * reach})
+
+
 def test_a_spring_does_not_stiffen_within_a_tiny_share_of_its_travel(signals):
     effect, x = get_effect("coupling_spring"), signals.q[:, 0] - 10 * signals.q[:, 1]
     shape = {"ratio": -10.0, "x0": float(np.median(x))}

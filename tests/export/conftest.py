@@ -48,6 +48,7 @@ STATIC = (
     Term("coupled_inertia", (1, 2), {"ratio": 0.5}),
     Term("coupling_spring", (1, 2), {"ratio": 1.0}),
     Term("coupling_spring", (1, 2), {"ratio": -1.0, "x0": 0.1, "bent": 1.0}),
+    Term("coupling_spring", (1, 2), {"ratio": 0.5, "x0": 0.1, "slack": 0.2}),
     Term("nonlinear_spring", (1,), {"q_middle": 0.2}),
     ("gravity_compensator", [2]),
     Term("gravity_compensator", (1,), {"aligned": 0.3, "lever": 0.4}),
