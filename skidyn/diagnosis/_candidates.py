@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._signals import Array
+from skidyn._signals import Array, Signals
 from skidyn.diagnosis._rule import NEGLIGIBLE
 from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
@@ -88,6 +88,23 @@ class Candidate:
         bounded = np.isfinite(self.lowest)
         short = (self.lowest - coefficients)[bounded] * size[bounded]
         return not np.any(short > nothing)
+
+    def can_have(self, coefficients: Array, signals: Signals) -> bool:
+        """Whether coefficients are allowed, and those of this effect rather than of another one.
+
+        Parameters
+        ----------
+        coefficients : ndarray of shape (n_coefficients,)
+            Fitted values.
+        signals : Signals
+            Motion and robot.
+
+        Returns
+        -------
+        bool
+        """
+        term = self.term
+        return self.allows(coefficients) and term.effect.can_have(coefficients, term.shape, signals)
 
     @cached_property
     def joints(self) -> tuple[int, ...]:

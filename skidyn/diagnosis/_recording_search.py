@@ -38,8 +38,7 @@ class RecordingSearch(SearchState):
     def can_be(self, candidate: Candidate, others: Sequence[Candidate]) -> bool:
         """Whether a candidate's coefficients, together with others, are physically possible."""
         size = self.tester(others).test(candidate.rows).coefficients
-        term = candidate.term
-        return candidate.allows(size) and term.effect.can_have(size, term.shape, self.problem.few)
+        return candidate.can_have(size, self.problem.few)
 
     def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
         """Effects of few recordings as known effects, those of many recordings as unknown.

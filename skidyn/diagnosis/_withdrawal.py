@@ -67,7 +67,8 @@ def to_withdraw(
     intervals : dict
         Parameters of every term, with intervals for fixed shapes.
     """
-    return _vague(problem, result.findings, intervals) or _impossible(result.findings, intervals)
+    findings = result.findings
+    return _vague(problem, findings, intervals) or _impossible(problem, findings, intervals)
 
 
 def useless(
@@ -182,7 +183,7 @@ def _vague(
 
 
 def _impossible(
-    findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
+    problem: Problem, findings: Sequence[Hypothesis], intervals: dict[Term, dict[str, Any]]
 ) -> Withdrawal | None:
     """The last finding with terms whose coefficients are physically impossible given all others.
 
@@ -195,7 +196,7 @@ def _impossible(
             told = intervals[candidate.term]
             values = [told.get(c.name) for c in candidate.term.coefficients]
             found = [v[0] for v in values if isinstance(v, tuple)]
-            if len(found) == len(values) and not candidate.allows(np.array(found)):
+            if len(found) == len(values) and not candidate.can_have(np.array(found), problem.few):
                 terms.append(candidate)
         if terms:
             return hypothesis, terms
