@@ -26,8 +26,14 @@ from skidyn.diagnosis._signal_products import (
     product_with_load,
     products_of_two,
 )
-from skidyn.diagnosis._signal_sets import errors_of_folds, sets_of_signals, solved
+from skidyn.diagnosis._signal_sets import (
+    errors_of_folds,
+    product_with_function,
+    sets_of_signals,
+    solved,
+)
 from skidyn.diagnosis._variables import average_at_rows, averaged_signals
+from skidyn.effects import Factor
 from skidyn.evidence import Problem
 
 #: Most rows that are used.
@@ -60,6 +66,9 @@ class Followed(NamedTuple):
         The best function of a signal with a size of its own in each recording.
     loaded : list of Product
         The best product of the load and a function of a signal.
+    partly : list of tuple of Factor, tuple of str and int
+        For the best sets of two and of three signals, the best product of a simple function of one
+        and a free function of the others, with the number of products of which it is the best.
     """
 
     sets: list[tuple[str, ...]]
@@ -67,6 +76,7 @@ class Followed(NamedTuple):
     products: list[Product]
     changing: list[Product]
     loaded: list[Product]
+    partly: list[tuple[Factor, tuple[str, ...], int]]
 
 
 def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
@@ -91,11 +101,15 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     # numbered without gaps: dropped trajectories must not leave an empty quarter below
     numbers, fold = np.unique(problem.fold[joint][::step], return_inverse=True)
     if len(numbers) < 4:
-        return Followed([], [], [], changing, [])
+        return Followed([], [], [], changing, [], [])
     nearest = _nearest(joint, range(problem.n_joints))
     close = {name: x for name, x in signals.items() if _joint_of(name) in nearest}
     sets, products = products_of_two(signals, y, fold)
-    found = [*sets_of_signals(signals, y, fold, close), *sets]
+    best = sets_of_signals(signals, y, fold, close)
+    found = [*best, *sets]
+    several = [names for names in best if len(names) > 1]
+    with_function = [product_with_function(signals, y, fold, names) for names in several]
+    partly = [product for product in with_function if product is not None]
     triple = product_of_three(close, y, fold, products)
     if triple is not None:
         products.append(triple)
@@ -110,7 +124,7 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     turning = np.flatnonzero(~problem.signals.prismatic).tolist()
     positions = {k: signals[f"q{k + 1}"] for k in sorted(_nearest(joint, turning))}
     sums = _by_sums(positions, y, fold)
-    return Followed(list(dict.fromkeys(found)), sums, products, changing, loaded)
+    return Followed(list(dict.fromkeys(found)), sums, products, changing, loaded, partly)
 
 
 def _nearest(joint: int, joints: Iterable[int]) -> list[int]:

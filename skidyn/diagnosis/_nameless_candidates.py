@@ -19,6 +19,7 @@ from skidyn.effects import (
     FunctionOfSum,
     NamelessEffect,
     ProductOfSignals,
+    ProductWithFunction,
     ProductWithLoad,
     SizeByRecording,
     Term,
@@ -90,6 +91,8 @@ def _shapes(
     few = problem.few
     if isinstance(effect, ProductOfSignals):
         return [(effect.shape_of(factors), among) for factors, among in followed.products]
+    if isinstance(effect, ProductWithFunction):
+        return [(effect.shape_of(few, factor, names), n) for factor, names, n in followed.partly]
     if isinstance(effect, ProductWithLoad):
         return [(effect.shape_of(factors), among) for factors, among in followed.loaded]
     if isinstance(effect, SizeByRecording):

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.diagnosis._signal_products import LEAST_SHARE, predictable
+from skidyn.diagnosis._signal_products import LEAST_SHARE, predictable, simple_functions
+from skidyn.effects import Factor
 
 #: Most rows that are used.
 MOST_ROWS = 1000
@@ -79,6 +80,47 @@ def sets_of_signals(
             found.append(tuple(sorted(names)))
             before = left
     return found
+
+
+def product_with_function(
+    signals: dict[str, Array], y: Array, fold: NDArray[np.int64], names: Names
+) -> tuple[Factor, Names, int] | None:
+    """The best product of a simple function of one signal and a free function of the others.
+
+    Parameters
+    ----------
+    signals : dict of str to ndarray of shape (n_rows,)
+        By name.
+    y : ndarray of shape (n_rows,)
+        Residual, N m or N.
+    fold : ndarray of shape (n_rows,)
+        Fold of every row, from 0.
+    names : tuple of str
+        The two or three signals.
+
+    Returns
+    -------
+    tuple of Factor, tuple of str and int, or None
+        The simple function, the other signals, and the number of products that were tried; None if
+        no product predicts the residual.
+    """
+    step = max(1, -(-len(y) // MOST_ROWS))
+    own = {name: signals[name][::step] for name in names}
+    y, fold = y[::step] - y[::step].mean(), fold[::step]
+    parts = [np.flatnonzero(fold == f) for f in np.unique(fold)]
+    hats = {name: _hats(x, KNOTS[len(names) - 1]) for name, x in own.items()}
+    tried, blocks = [], []
+    for name, x in own.items():
+        others = tuple(other for other in names if other != name)
+        free = _products([hats[other] for other in others])
+        for factor in simple_functions(name, x):
+            values = factor.of(x)
+            tried.append((factor, others))
+            blocks.append(values[:, None] / max(np.sqrt(np.mean(values**2)), 1e-300) * free)
+    left = errors_of_folds(np.stack(blocks), y, parts, RIDGE)
+    best = int(np.argmin(left.sum(1)))
+    energy = np.array([y[rows] @ y[rows] for rows in parts])
+    return (*tried[best], len(tried)) if predictable(energy, left[best]) else None
 
 
 def _ranked(

@@ -46,6 +46,7 @@ from skidyn.effects._nameless_periodic import ClockPeriodic as ClockPeriodic
 from skidyn.effects._nameless_products import (
     Factor as Factor,
     ProductOfSignals as ProductOfSignals,
+    ProductWithFunction as ProductWithFunction,
     ProductWithLoad as ProductWithLoad,
     SizeByRecording as SizeByRecording,
 )

@@ -10,7 +10,9 @@ import numpy as np
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
+from skidyn.effects._nameless_signals import products_of_low_order
 from skidyn.effects._parameters import Coefficient
+from skidyn.effects._smooth import supported_range
 
 
 class Factor(NamedTuple):
@@ -77,6 +79,54 @@ class ProductOfSignals(NamelessEffect):
         for factor in map(Factor, shape["of"], shape["functions"], shape["middle"]):
             product = product * _values(signals, factor)
         return product[:, None]
+
+
+class ProductWithFunction(NamelessEffect):
+    """A simple function of a signal times a free function of one or two others.
+
+    The dry friction of a joint over the position of another, or a force that a joint changes by its
+    position. The free function is a polynomial of low order, as of
+    :class:`~skidyn.effects.FunctionOfSignals`, which a short log determines.
+    """
+
+    kind = "product_with_function"
+    title = "Product of a signal and a function of others"
+    formula = r"f_1(s_1)\,f(s_2)\ \text{or}\ f_1(s_1)\,f(s_2, s_3)"
+    coefficients = unnamed_coefficients(10)
+    search = "screened"
+
+    def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
+        return tuple(sorted((shape["by"], *shape["of"])))
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        return []
+
+    def shape_of(self, signals: Signals, factor: Factor, names: Sequence[str]) -> dict[str, Any]:
+        """Shape of a product, over the range that the other signals cover.
+
+        Parameters
+        ----------
+        signals : Signals
+        factor : Factor
+            The simple function.
+        names : sequence of str
+            One or two other signals, joints counted from 1, such as ``"q2"``.
+        """
+        low, high = zip(
+            *(supported_range(signals, signals.named(name)) for name in names), strict=True
+        )
+        by, function, middle = factor
+        shape = {"by": by, "function": function, "middle": middle}
+        return {**shape, "of": tuple(names), "low": low, "high": high}
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        return self.coefficients[:6] if len(shape.get("of", ())) == 1 else self.coefficients
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        ranges = shape["of"], shape["low"], shape["high"]
+        free = products_of_low_order(signals, *ranges, len(self.coefficients_of(shape)))
+        factor = Factor(shape["by"], shape["function"], shape["middle"])
+        return _values(signals, factor)[:, None] * free
 
 
 class ProductWithLoad(NamelessEffect):
@@ -173,4 +223,9 @@ def _values(signals: Signals, factor: Factor) -> Array:
     return factor.of(signals.named(name))
 
 
-PRODUCTS: tuple[type[NamelessEffect], ...] = (ProductOfSignals, ProductWithLoad, SizeByRecording)
+PRODUCTS: tuple[type[NamelessEffect], ...] = (
+    ProductOfSignals,
+    ProductWithFunction,
+    ProductWithLoad,
+    SizeByRecording,
+)

@@ -71,19 +71,45 @@ class FunctionOfSignals(NamelessEffect):
         return len(names) == self.n_signals
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        n = len(self.coefficients)
-        parts = []
-        for name, low, high in zip(shape["of"], shape["low"], shape["high"], strict=True):
-            sign = signals.sign[:, int(name[2:]) - 1] if name.startswith("dq") else None
-            parts.append(ordered_functions(signals.named(name), sign, low, high))
-        orders = [range(p.shape[1]) for p in parts]
-        chosen = sorted(itertools.product(*orders), key=lambda powers: (sum(powers), powers))
-        return np.column_stack(
-            [
-                np.prod([p[:, k] for p, k in zip(parts, powers, strict=True)], axis=0)
-                for powers in chosen[:n]
-            ]
-        )
+        ranges = shape["of"], shape["low"], shape["high"]
+        return products_of_low_order(signals, *ranges, len(self.coefficients))
+
+
+def products_of_low_order(
+    signals: Signals,
+    names: Sequence[str],
+    low: Sequence[float],
+    high: Sequence[float],
+    count: int,
+) -> Array:
+    """Products of functions of some signals, those of the lowest orders.
+
+    Parameters
+    ----------
+    signals : Signals
+    names : sequence of str
+        Signals, joints counted from 1.
+    low, high : sequence of float
+        Their ranges.
+    count : int
+        Number of products.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, count)
+    """
+    parts = []
+    for name, *bounds in zip(names, low, high, strict=True):
+        sign = signals.sign[:, int(name[2:]) - 1] if name.startswith("dq") else None
+        parts.append(ordered_functions(signals.named(name), sign, *bounds))
+    orders = [range(p.shape[1]) for p in parts]
+    chosen = sorted(itertools.product(*orders), key=lambda powers: (sum(powers), powers))
+    return np.column_stack(
+        [
+            np.prod([p[:, k] for p, k in zip(parts, powers, strict=True)], axis=0)
+            for powers in chosen[:count]
+        ]
+    )
 
 
 class FunctionOfSignal(FunctionOfSignals):
@@ -124,48 +150,29 @@ class FunctionOfThreeSignals(FunctionOfSignals):
     n_signals = 3
 
 
-class FrictionOverSignal(FunctionOfSignals):
-    """Dry friction of any joint that depends on another signal."""
+class FrictionOverTwoSignals(FunctionOfSignals):
+    """Dry friction that depends on two other signals, as on the load in a configuration."""
 
-    kind = "friction_over_signal"
-    title = "Dry friction over a signal"
-    formula = r"\mathrm{sign}\,\dot q_k\,f(s)"
-    coefficients = unnamed_coefficients(HIGHEST_OF_TWO + 1)
-    n_signals = 2
+    kind = "friction_over_two_signals"
+    title = "Dry friction over two signals"
+    formula = r"\mathrm{sign}\,\dot q\,f(s_1, s_2)"
+    coefficients = unnamed_coefficients(21)
+    n_signals = 3
 
     def admits(self, names: Sequence[str]) -> bool:
         return super().admits(names) and sum(name.startswith("dq") for name in names) == 1
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        ranges = list(zip(shape["of"], shape["low"], shape["high"], strict=True))
-        (speed,) = (name for name, *_ in ranges if name.startswith("dq"))
-        functions = [
-            ordered_functions(signals.named(name), None, low, high)[:, : HIGHEST_OF_TWO + 1]
+        (speed,) = (name for name in shape["of"] if name.startswith("dq"))
+        ranges = zip(shape["of"], shape["low"], shape["high"], strict=True)
+        first, second = (
+            ordered_functions(signals.named(name), None, low, high)
             for name, low, high in ranges
             if name != speed
-        ]
-        return signals.sign[:, [int(speed[2:]) - 1]] * self._products(functions)
-
-    def _products(self, functions: Sequence[Array]) -> Array:
-        """Functions of the other signals, lowest orders first in each."""
-        return functions[0]
-
-
-class FrictionOverTwoSignals(FrictionOverSignal):
-    """Dry friction that depends on two other signals, as on the load in a configuration."""
-
-    kind = "friction_over_two_signals"
-    title = "Dry friction over two signals"
-    formula = r"\mathrm{sign}\,\dot q_k\,f(s_1, s_2)"
-    coefficients = unnamed_coefficients(21)
-    n_signals = 3
-
-    def _products(self, functions: Sequence[Array]) -> Array:
-        first, second = functions
-        most = first.shape[1]
-        return np.column_stack(
-            [first[:, i] * second[:, k] for i in range(most) for k in range(most - i)]
         )
+        most = HIGHEST_OF_TWO + 1
+        products = [first[:, i] * second[:, k] for i in range(most) for k in range(most - i)]
+        return signals.sign[:, [int(speed[2:]) - 1]] * np.column_stack(products)
 
 
 class FunctionOfSum(NamelessEffect):
@@ -296,7 +303,6 @@ OF_SIGNALS: tuple[type[NamelessEffect], ...] = (
     FunctionOfTwoSignals,
     LowOrderOfTwoSignals,
     FunctionOfThreeSignals,
-    FrictionOverSignal,
     FrictionOverTwoSignals,
     FunctionOfSum,
     TorqueBetweenTwoJoints,

@@ -18,16 +18,6 @@ def test_a_function_of_signals_follows_their_product_and_no_other(signals, left_
     assert left_by(columns, np.sin(17 * signals.time)) > 0.5
 
 
-def test_friction_over_a_signal_follows_one_velocity_and_another_signal(signals, left_by):
-    effect = get_effect("friction_over_signal")
-    assert effect.admits(("dq2", "q1"))
-    assert not effect.admits(("dq1", "dq2")) and not effect.admits(("q1", "q2"))
-    columns = effect.columns(signals, 0, **effect.shape_of(signals, ("dq2", "q1")))
-    size = 2.0 + signals.q[:, 0] ** 2
-    assert left_by(columns, size * signals.sign[:, 1]) < 1e-6
-    assert left_by(columns, size) > 0.3
-
-
 def test_friction_over_two_signals_follows_one_velocity_and_two_others(signals, left_by):
     effect = get_effect("friction_over_two_signals")
     names = ("dq1", "q1", "q2")
