@@ -23,8 +23,8 @@ from skidyn.diagnosis._signal_products import (
     Product,
     predictable,
     product_of_three,
+    product_of_two,
     product_with_load,
-    products_of_two,
 )
 from skidyn.diagnosis._signal_sets import (
     errors_of_folds,
@@ -104,16 +104,14 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
         return Followed([], [], [], changing, [], [])
     nearest = _nearest(joint, range(problem.n_joints))
     close = {name: x for name, x in signals.items() if _joint_of(name) in nearest}
-    sets, products = products_of_two(signals, y, fold)
-    best = sets_of_signals(signals, y, fold, close)
-    found = [*best, *sets]
-    several = [names for names in best if len(names) > 1]
+    sets = sets_of_signals(signals, y, fold, close)
+    several = [names for names in sets if len(names) > 1]
     with_function = [product_with_function(signals, y, fold, names) for names in several]
     partly = [product for product in with_function if product is not None]
-    triple = product_of_three(close, y, fold, products)
-    if triple is not None:
-        products.append(triple)
-        found.append(tuple(sorted(factor.signal for factor in triple[0])))
+    pair = product_of_two(signals, y, fold)
+    triple = product_of_three(close, y, fold, pair)
+    products = [product for product in (pair, triple) if product is not None]
+    sets += [tuple(sorted({factor.signal for factor in factors})) for factors, _ in products]
     loaded = []
     if problem.robot is not None and problem.signals.load is not None:
         load = average_at_rows(problem, joint, problem.signals.load[:, joint])[::step]
@@ -124,7 +122,7 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     turning = np.flatnonzero(~problem.signals.prismatic).tolist()
     positions = {k: signals[f"q{k + 1}"] for k in sorted(_nearest(joint, turning))}
     sums = _by_sums(positions, y, fold)
-    return Followed(list(dict.fromkeys(found)), sums, products, changing, loaded, partly)
+    return Followed(list(dict.fromkeys(sets)), sums, products, changing, loaded, partly)
 
 
 def _nearest(joint: int, joints: Iterable[int]) -> list[int]:

@@ -4,21 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import ttest_1samp
 
 from skidyn._signals import Array
-from skidyn.diagnosis._pursuit import Products, pursue
 from skidyn.effects import Factor
 
-#: Most signals of a set.
-MOST_SIGNALS = 3
 #: Least share of the squared residual that must be predictable, and largest p-value.
 LEAST_SHARE, CHANCE = 0.03, 0.05
-#: A further product must remove this share of the squared residual.
+#: A product must remove this share of the squared residual.
 WORTH = 0.05
 #: A product that varies by a smaller share of its squares counts as constant.
 CONSTANT = 1e-10
@@ -54,10 +50,8 @@ def by_fold(values: Array, fold: NDArray[np.int64]) -> Array:
     return np.bincount(fold, values).astype(float)
 
 
-def products_of_two(
-    signals: dict[str, Array], y: Array, fold: NDArray[np.int64]
-) -> tuple[list[tuple[str, ...]], list[Product]]:
-    """The signals of the best products of two simple functions, and the best product itself.
+def product_of_two(signals: dict[str, Array], y: Array, fold: NDArray[np.int64]) -> Product | None:
+    """The best simple function of one signal or product of two, if it predicts the residual.
 
     Parameters
     ----------
@@ -67,36 +61,25 @@ def products_of_two(
         Residual, N m or N.
     fold : ndarray of shape (n_rows,)
         Fold of every row, from 0.
-
-    Returns
-    -------
-    sets : list of tuple of str
-        Signals of the best product, and of all chosen ones; empty if they predict nothing.
-    products : list of Product
-        The best one, or none.
     """
-    pairs = _Pairs.of(signals)
-    of = pairs.signal[np.array([pairs.first, pairs.second])]
-
-    def admissible(chosen: Sequence[int]) -> NDArray[np.bool_]:
-        used = np.unique(of[:, chosen][of[:, chosen] >= 0])
-        new = (of >= 0) & ~np.isin(of, used)
-        more = new.sum(0) - (new[0] & (of[0] == of[1]))
-        return np.asarray(len(used) + more <= MOST_SIGNALS)
-
-    worth = WORTH * float(y @ y)
-    products = pairs.products(y, fold)
-    chosen, _ = pursue(products, worth=worth, longest=of.shape[1], admissible=admissible)
-    if not chosen or not _predicted_by([pairs.column(k) for k in chosen], y, fold):
-        return [], []
-    names = list(signals)
-    sets = [{names[i] for i in of[:, k] if i >= 0} for k in chosen]
-    best = pairs.factors_of(chosen[0]), of.shape[1]
-    return [tuple(sorted(sets[0])), tuple(sorted(set().union(*sets)))], [best]
+    y = y - y.mean()
+    factors = [factor for name, x in signals.items() for factor in simple_functions(name, x)]
+    # times a constant, a function is one of a single signal
+    values = np.column_stack([values_of(factors, signals), np.ones(len(y))])
+    mean = values.T @ values / len(y)
+    along = values.T @ (values * y[:, None])
+    gain = _gains(along, (values**2).T @ values**2, mean, len(y))
+    gain[np.tril_indices(len(gain))] = 0.0
+    best = np.unravel_index(int(np.argmax(gain)), gain.shape)
+    column = _without_mean(values[:, best].T)
+    if gain[best] <= WORTH * float(y @ y) or not _predicted_by([column], y, fold):
+        return None
+    among = len(factors) * (len(factors) + 1) // 2
+    return tuple(factors[k] for k in best if k < len(factors)), among
 
 
 def product_of_three(
-    signals: dict[str, Array], y: Array, fold: NDArray[np.int64], pairs: Sequence[Product]
+    signals: dict[str, Array], y: Array, fold: NDArray[np.int64], pair: Product | None
 ) -> Product | None:
     """The best product of functions of three signals, if it predicts more than those of two.
 
@@ -108,8 +91,8 @@ def product_of_three(
         Residual, N m or N.
     fold : ndarray of shape (n_rows,)
         Fold of every row, from 0.
-    pairs : sequence of Product
-        Products of two functions that predict it.
+    pair : Product or None
+        The product of two functions that predicts it.
     """
     step = max(1, -(-len(y) // ROWS_OF_TRIPLES))
     y, fold = y[::step] - y[::step].mean(), fold[::step]
@@ -117,10 +100,9 @@ def product_of_three(
         return None
     signals = {name: x[::step] for name, x in signals.items()}
     least = WORTH * float(y @ y)
-    for pair, _ in pairs:
-        if all(factor.signal in signals for factor in pair):
-            column = _without_mean([factor.of(signals[factor.signal]) for factor in pair])
-            least += float(column @ y) ** 2 / max(float(column @ column), 1e-300)
+    if pair is not None and all(factor.signal in signals for factor in pair[0]):
+        column = _without_mean([factor.of(signals[factor.signal]) for factor in pair[0]])
+        least += float(column @ y) ** 2 / max(float(column @ column), 1e-300)
     factors = [
         factor
         for name, x in signals.items()
@@ -186,14 +168,37 @@ def _best_triple(values: Array, own: NDArray[np.int64], y: Array) -> tuple[list[
         third = values[:, [k]]
         along = (values * (third * y[:, None])).T @ values
         mean = (values * third).T @ values / len(y)
-        square = (values**2 * third**2).T @ values**2 - len(y) * mean**2
-        tells = others & (square > CONSTANT * len(y))
-        gain = np.where(tells, along**2 / np.where(tells, square, 1.0), 0.0)
+        square = (values**2 * third**2).T @ values**2
+        gain = np.where(others, _gains(along, square, mean, len(y)), 0.0)
         among += int(others.sum())
         i, j = np.unravel_index(int(np.argmax(gain)), gain.shape)
         if gain[i, j] > most:
             best, most = [int(k), int(i), int(j)], float(gain[i, j])
     return best, most, among
+
+
+def _gains(along: Array, square: Array, mean: Array, count: int) -> Array:
+    """What products of functions remove of the square of a residual without mean.
+
+    Parameters
+    ----------
+    along : ndarray of shape (n_functions, n_functions)
+        Sums of the products times the residual.
+    square : ndarray of shape (n_functions, n_functions)
+        Sums of their squares.
+    mean : ndarray of shape (n_functions, n_functions)
+        Their means over the rows.
+    count : int
+        Number of rows.
+
+    Returns
+    -------
+    ndarray of shape (n_functions, n_functions)
+        Zero for products that do not vary.
+    """
+    varies = square - count * mean**2
+    tells = varies > CONSTANT * count
+    return np.where(tells, along**2 / np.where(tells, varies, 1.0), 0.0)
 
 
 def _without_mean(factors: Sequence[Array] | Array) -> Array:
@@ -210,86 +215,6 @@ def _predicted_by(columns: Sequence[Array], y: Array, fold: NDArray[np.int64]) -
         weights = np.linalg.lstsq(table[~out], y[~out], rcond=None)[0]
         left[out] = (y[out] - table[out] @ weights) ** 2
     return predictable(by_fold(y**2, fold), by_fold(left, fold))
-
-
-@dataclass(frozen=True)
-class _Pairs:
-    """Products of two simple functions of the signals, less their means.
-
-    There may be many thousands. The pursuit needs only sums of products of three or four functions,
-    which one matrix product gives for all pairs.
-
-    Attributes
-    ----------
-    values : ndarray of shape (n_rows, n_functions)
-        Values of the functions; the last one is constant.
-    signal : ndarray of shape (n_functions,)
-        Number of the signal behind each, -1 for the constant.
-    first, second : ndarray of shape (n_pairs,)
-        Functions of each pair: every function alone, then all pairs.
-    mean : ndarray of shape (n_pairs,)
-        Of each product over all rows.
-    factors : list of Factor
-        The functions, without the constant.
-    """
-
-    values: Array
-    signal: NDArray[np.int64]
-    first: NDArray[np.int64]
-    second: NDArray[np.int64]
-    mean: Array
-    factors: list[Factor]
-
-    @classmethod
-    def of(cls, signals: dict[str, Array]) -> _Pairs:
-        functions = [simple_functions(name, x) for name, x in signals.items()]
-        factors = [factor for some in functions for factor in some]
-        values = values_of(factors, signals)
-        count, constant = values.shape[1], np.ones(len(values))
-        first, second = np.triu_indices(count, 1)
-        first = np.concatenate([np.arange(count), first])
-        second = np.concatenate([np.full(count, count), second])
-        values = np.column_stack([values, constant])
-        signal = np.repeat(np.arange(len(functions)), [len(some) for some in functions])
-        mean = (values.T @ values / len(values))[first, second]
-        return cls(values, np.append(signal, -1), first, second, mean, factors)
-
-    def factors_of(self, k: int) -> tuple[Factor, ...]:
-        """The functions of one product."""
-        both = int(self.first[k]), int(self.second[k])
-        return tuple(self.factors[i] for i in both if i < len(self.factors))
-
-    def column(self, k: int) -> Array:
-        """Values of one product, shape (n_rows,)."""
-        return np.asarray(
-            self.values[:, self.first[k]] * self.values[:, self.second[k]] - self.mean[k]
-        )
-
-    def products(self, y: Array, fold: NDArray[np.int64]) -> Products:
-        """Products of all columns with themselves, with a residual and with each other."""
-        parts = [np.flatnonzero(fold == f) for f in np.unique(fold)]
-        square = np.array([self._squares(self.values[rows]) for rows in parts])
-        size = (square + [len(rows) * self.mean**2 for rows in parts]).sum(0)
-        tells = square.sum(0) > CONSTANT * size  # else the rest is rounding
-
-        def along(values: Array) -> Array:
-            return np.where(tells, [self._with(values[r], self.values[r]) for r in parts], 0.0)
-
-        return Products(
-            np.where(tells, square, 0.0),
-            along(y),
-            np.array([y[rows] @ y[rows] for rows in parts]),
-            lambda k: along(self.column(k)),
-        )
-
-    def _squares(self, values: Array) -> Array:
-        fourth, mixed = (values**2).T @ values**2, values.T @ values
-        at = self.first, self.second
-        return np.asarray(fourth[at] - 2 * self.mean * mixed[at] + len(values) * self.mean**2)
-
-    def _with(self, y: Array, values: Array) -> Array:
-        third = values.T @ (values * y[:, None])
-        return np.asarray(third[self.first, self.second] - self.mean * y.sum())
 
 
 def values_of(factors: Sequence[Factor], signals: dict[str, Array]) -> Array:
