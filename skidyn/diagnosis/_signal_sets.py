@@ -52,7 +52,7 @@ def sets_of_signals(
     fold : ndarray of shape (n_rows,)
         Fold of every row, from 0.
     near : collection of str
-        Signals of which all pairs are tried; others only with the best single one.
+        Signals of which all pairs are tried, and thirds; others only with the best single one.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def sets_of_signals(
     others = [name for name in moving if name != first and not {name, first} <= {*close}]
     sets = [*itertools.combinations(close, 2), *((first, name) for name in others)]
     pairs = _ranked(sets, moving, y, parts)
-    more = {frozenset((*pair, name)) for pair, _ in pairs[:PAIRS] for name in moving}
+    more = {frozenset((*pair, name)) for pair, _ in pairs[:PAIRS] for name in close}
     triples = _ranked(sorted(tuple(sorted(s)) for s in more if len(s) == 3), moving, y, parts)
     found: list[Names] = []
     energy = before = np.array([y[rows] @ y[rows] for rows in parts])
