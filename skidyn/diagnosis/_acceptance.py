@@ -353,15 +353,13 @@ class JudgingSearch(ChoosingSearch):
             return False  # a line in a spectrum may be at its end
         if shapes[0].name not in candidate.term.shape:
             return False
-        unit = self.problem.signals.unit[candidate.joints[0]] if shapes[0].scales else 1.0
-        far = self.settings.far_end * shapes[0].high * unit
-        return bool(candidate.term.shape[shapes[0].name] >= far)
+        _, high = shapes[0].range_on(self.problem.signals, candidate.joints[0])
+        return bool(candidate.term.shape[shapes[0].name] >= self.settings.far_end * high)
 
     def _limit_kind(self, candidate: Candidate, together: Sequence[Candidate]) -> str:
         """The simpler kind that is equivalent to a candidate with an unresolved shape or size."""
-        unit = self.problem.signals.unit[candidate.joints[0]]
         for shape in candidate.term.effect.shapes:
-            low = shape.low * (unit if shape.scales else 1.0)
+            low, _ = shape.range_on(self.problem.signals, candidate.joints[0])
             value = candidate.term.shape.get(shape.name, np.inf)
             if shape.limit_kind and value < self.settings.resolved * low:
                 return shape.limit_kind

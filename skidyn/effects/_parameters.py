@@ -8,6 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from skidyn._signals import Signals
+
 
 @dataclass(frozen=True)
 class Coefficient:
@@ -65,7 +67,7 @@ class Shape:
         Initial values for a revolute joint; lengths are a tenth of it in m for sliders when
         ``scales`` is True.
     low, high : float
-        Range of the refined value.
+        Range of the refined value for a revolute joint.
     spacing : {"log", "linear", "samples"}
         Spacing of the refinement: by factors, by differences, or by samples of the log for a
         moment in time.
@@ -92,3 +94,23 @@ class Shape:
     scales: bool = True
     has_interval: bool = True
     limit_kind: str = ""
+
+    def range_on(self, signals: Signals, joint: int) -> tuple[float, float]:
+        """Lowest and highest value on a joint; the latter grows with the travel of a slider.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+        joint : int
+            Joint, from 0.
+
+        Returns
+        -------
+        low, high : float
+        """
+        if not self.scales:
+            return self.low, self.high
+        unit = float(signals.unit[joint])
+        far = float(np.ptp(signals.q[:, joint])) / 2 if signals.prismatic[joint] else unit
+        return self.low * unit, self.high * max(unit, far)

@@ -227,8 +227,7 @@ def _by_simplex(
 
 def _range(problem: Problem, term: Term, shape: Shape) -> tuple[float, float, float]:
     """Lowest and highest value of a shape parameter and the first step."""
-    unit = float(problem.signals.unit[term.places[0]]) if shape.scales else 1.0
     step = FIRST_STEP
     if shape.spacing == "linear":
         step = FIRST_SHARE * term.effect.travel(problem.signals, term.places, term.shape)
-    return shape.low * unit, shape.high * unit, step
+    return *shape.range_on(problem.signals, term.places[0]), step
