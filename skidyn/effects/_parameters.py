@@ -108,6 +108,7 @@ class Shape:
         Returns
         -------
         low, high : float
+            In the unit of the value for this joint.
         """
         if not self.scales:
             return self.low, self.high
