@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.diagnosis._signal_products import LEAST_SHARE, predictable, simple_functions
+from skidyn.diagnosis._signal_products import predictable, simple_functions
 from skidyn.effects import Factor
 
 #: Most rows that are used.
@@ -28,6 +28,8 @@ KNOTS = (8, 6, 4)
 RIDGE = 0.1
 #: Number of the best pairs to which a third signal is added.
 PAIRS = 3
+#: Share of the error of the best smaller set that a further signal must remove.
+FURTHER = 0.1
 #: Singular values of the hats below this share of the largest are left out.
 RESOLVED = 1e-6
 
@@ -74,11 +76,12 @@ def sets_of_signals(
     more = {frozenset((*pair, name)) for pair, _ in pairs[:PAIRS] for name in close}
     triples = _ranked(sorted(tuple(sorted(s)) for s in more if len(s) == 3), moving, y, parts)
     found: list[Names] = []
-    energy = before = np.array([y[rows] @ y[rows] for rows in parts])
+    energy = np.array([y[rows] @ y[rows] for rows in parts])
+    most = float(energy.sum())
     for names, left in (ranked[0] for ranked in (singles, pairs, triples) if ranked):
-        if predictable(energy, left) and left.sum() < (1 - LEAST_SHARE) * before.sum():
+        if predictable(energy, left) and left.sum() < most:
             found.append(tuple(sorted(names)))
-            before = left
+            most = (1 - FURTHER) * float(left.sum())
     return found
 
 
