@@ -3,8 +3,8 @@
 
 A function of a signal is a sum of hats (linear between knots at its quantiles), and one of several
 signals a sum of products of their hats. Every signal, every pair of signals of near joints, and the
-best pairs with a third signal are fitted to all folds but one at a time; the set that predicts the
-folds left out best is the set on which the residual depends. Held-out errors need only the products
+best pairs with a third signal are fitted to all folds but one at a time (the last ones if a smaller
+set predicts anything); the set that predicts the folds left out best is the set on which the residual depends. Held-out errors need only the products
 of the columns within each fold.
 """
 
@@ -73,10 +73,12 @@ def sets_of_signals(
     others = [name for name in moving if name != first and not {name, first} <= {*close}]
     sets = [*itertools.combinations(close, 2), *((first, name) for name in others)]
     pairs = _ranked(sets, moving, y, parts)
+    energy = np.array([y[rows] @ y[rows] for rows in parts])
+    if not any(predictable(energy, ranked[0][1]) for ranked in (singles, pairs) if ranked):
+        return []
     more = {frozenset((*pair, name)) for pair, _ in pairs[:PAIRS] for name in close}
     triples = _ranked(sorted(tuple(sorted(s)) for s in more if len(s) == 3), moving, y, parts)
     found: list[Names] = []
-    energy = np.array([y[rows] @ y[rows] for rows in parts])
     most = float(energy.sum())
     for names, left in (ranked[0] for ranked in (singles, pairs, triples) if ranked):
         if predictable(energy, left) and left.sum() < most:
