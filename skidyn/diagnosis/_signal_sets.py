@@ -2,10 +2,10 @@
 """Sets of one to three signals of which a function of any form predicts a residual.
 
 A function of a signal is a sum of hats (linear between knots at its quantiles), and one of several
-signals a sum of products of their hats. Every signal, every pair of signals of near joints, and the
-best pairs with a third signal are fitted to all folds but one at a time (the last ones if a smaller
-set predicts anything); the set that predicts the folds left out best is the set on which the residual depends. Held-out errors need only the products
-of the columns within each fold.
+signals a sum of products of their hats. Every signal, every pair of signals of near joints and, if
+one of these predicts anything, the best pairs with a third signal are fitted to all folds but one
+at a time; the set that predicts the folds left out best is the set on which the residual depends.
+Held-out errors need only the products of the columns within each fold.
 """
 
 from __future__ import annotations
