@@ -3,8 +3,7 @@
 
 Functions of known form are tried in any case. This finds the signals of functions with unknown
 form, in two ways: by functions of any form of one to three signals, and by all products of two
-simple functions of the signals, a second and third in addition to the best, and those of three
-signals of joints that are close.
+simple functions of the signals, and of three signals of joints that are close.
 """
 
 from __future__ import annotations
@@ -38,8 +37,8 @@ from skidyn.evidence import Problem
 
 #: Most rows that are used.
 MOST_ROWS = 2000
-#: Number of nearest joints among which sums of positions and products of three signals are formed,
-#: and waves of the sums per rad.
+#: Number of nearest joints among which sums of positions, sets of signals and products of three are
+#: formed, and waves of the sums per rad.
 MOST_NEAR, WAVES, SIGNS = 8, (0.5, 1.0, 2.0), (1.0, -1.0)
 #: Penalty of the squared coefficients of waves.
 RIDGE = 1e-3

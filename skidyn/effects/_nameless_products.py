@@ -10,9 +10,8 @@ import numpy as np
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
-from skidyn.effects._nameless_signals import products_of_low_order
+from skidyn.effects._nameless_signals import products_of_low_order, ranges_of
 from skidyn.effects._parameters import Coefficient
-from skidyn.effects._smooth import supported_range
 
 
 class Factor(NamedTuple):
@@ -112,12 +111,9 @@ class ProductWithFunction(NamelessEffect):
         names : sequence of str
             One or two other signals, joints counted from 1, such as ``"q2"``.
         """
-        low, high = zip(
-            *(supported_range(signals, signals.named(name)) for name in names), strict=True
-        )
         by, function, middle = factor
         shape = {"by": by, "function": function, "middle": middle}
-        return {**shape, "of": tuple(names), "low": low, "high": high}
+        return shape | ranges_of(signals, names)
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
         return self.coefficients[:6] if len(shape.get("of", ())) == 1 else self.coefficients

@@ -55,10 +55,7 @@ class FunctionOfSignals(NamelessEffect):
         names : sequence of str
             Signals, joints counted from 1, such as ``"q2"``.
         """
-        low, high = zip(
-            *(supported_range(signals, signals.named(name)) for name in names), strict=True
-        )
-        return {"of": tuple(names), "low": low, "high": high}
+        return ranges_of(signals, names)
 
     def admits(self, names: Sequence[str]) -> bool:
         """Whether it can be a function of some signals.
@@ -73,6 +70,24 @@ class FunctionOfSignals(NamelessEffect):
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         ranges = shape["of"], shape["low"], shape["high"]
         return products_of_low_order(signals, *ranges, len(self.coefficients))
+
+
+def ranges_of(signals: Signals, names: Sequence[str]) -> dict[str, Any]:
+    """Some signals and the ranges that they cover, as entries of a shape.
+
+    Parameters
+    ----------
+    signals : Signals
+    names : sequence of str
+        Signals, joints counted from 1, such as ``"q2"``.
+
+    Returns
+    -------
+    dict
+        The names, ``of``, and the ends of their ranges, ``low`` and ``high``, in their units.
+    """
+    low, high = zip(*(supported_range(signals, signals.named(name)) for name in names), strict=True)
+    return {"of": tuple(names), "low": low, "high": high}
 
 
 def products_of_low_order(

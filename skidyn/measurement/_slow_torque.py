@@ -10,7 +10,7 @@ what is left without such waves must show it, too.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator
 
 import numpy as np
 
@@ -114,22 +114,19 @@ def _without_waves(
     measurement: Measurement, order: int, period: int, joints: Collection[int]
 ) -> dict[int, tuple[float, float]]:
     """What differences of some joints, from 0, gain by a period without waves that repeat in it."""
-    ((_, own),) = _periods(measurement, order, [period], without_waves=True)
+    ((_, own),) = _periods(measurement, order, only=period)
     return {k: own[k] for k in joints}
 
 
 def _periods(
-    measurement: Measurement,
-    order: int,
-    periods: Iterable[int] = PERIODS,
-    *,
-    without_waves: bool = False,
+    measurement: Measurement, order: int, only: int | None = None
 ) -> list[tuple[int, dict[int, tuple[float, float]]]]:
     """What the differences of the torque of every joint, from 0, gain by every period.
 
     The values of one bus come at the same time, so that joints with much noise need not show by
     themselves what others show. Every gain of log-likelihood is given with the largest ratio of
-    sizes; joints that do not move and torques that never change are left out.
+    sizes; joints that do not move and torques that never change are left out. For a period alone,
+    ``only``, the differences are taken without waves that repeat in it.
     """
     s, spread = measurement.signals, np.std(measurement.torque, axis=0)
     joints = np.flatnonzero(measurement.excited & (spread > 0))
@@ -139,14 +136,20 @@ def _periods(
         for rows in s.segments
         if rows.stop - rows.start > 4 * FEWEST and _is_even(s.clock[rows])
     ]
+    if only is not None:
+        differences = [own - _waves(own, only) for own in differences]
+    parts = [np.log(np.abs(own) + rounding) for own in differences]
+    parts = [part - part.mean(axis=0) for part in parts]  # for squares without cancellation
+    squares = [np.sum(part**2, axis=0) for part in parts]
     found: list[tuple[int, dict[int, tuple[float, float]]]] = []
-    if not len(joints) or max(map(len, differences), default=0) < 4 * FEWEST:
+    if not len(joints) or max(map(len, parts), default=0) < 4 * FEWEST:
         return found
-    parts = [_logarithms(own, rounding) for own in differences]
-    for period in periods:
-        if without_waves:
-            parts = [_logarithms(own - _waves(own, period), rounding) for own in differences]
-        sizes = [_sizes(part, period) for part in parts if len(part) >= period * FEWEST]
+    for period in PERIODS if only is None else [only]:
+        sizes = [
+            _sizes(part, square, period)
+            for part, square in zip(parts, squares, strict=True)
+            if len(part) >= period * FEWEST
+        ]
         if not sizes:
             continue
         counts = np.array([n for _, n, _ in sizes])
@@ -165,12 +168,6 @@ def _is_even(clock: Array) -> bool:
     return bool(np.mean(np.abs(steps - usual) > 0.5 * usual) <= UNEVEN)
 
 
-def _logarithms(differences: Array, rounding: Array) -> Array:
-    """Logarithms of the sizes of differences, less their mean for squares without cancellation."""
-    logs = np.log(np.abs(differences) + rounding)
-    return np.asarray(logs - logs.mean(axis=0))
-
-
 def _waves(differences: Array, period: int) -> Array:
     """The part of differences, (n_rows, n_joints), whose square repeats after a number of rows.
 
@@ -185,19 +182,21 @@ def _waves(differences: Array, period: int) -> Array:
     return np.asarray(columns @ np.linalg.lstsq(columns, differences, rcond=None)[0])
 
 
-def _sizes(logs: Array, period: int) -> tuple[Array, int, Array]:
+def _sizes(logs: Array, square: Array, period: int) -> tuple[Array, int, Array]:
     """Mean logarithms by phase, their number, and what phases gain.
 
     Parameters
     ----------
     logs : ndarray of shape (n_differences, n_joints)
         Logarithms of the sizes of differences, less their mean.
+    square : ndarray of shape (n_joints,)
+        Sum of their squares.
     period : int
         Number of phases.
     """
     count = len(logs) // period * period
     means = logs[:count].reshape(-1, period, logs.shape[1]).mean(axis=0)
-    total = np.mean(logs[:count] ** 2, axis=0) - means.mean(axis=0) ** 2
+    total = (square - np.sum(logs[count:] ** 2, axis=0)) / count - means.mean(axis=0) ** 2
     within = total - means.var(axis=0)
     gain = 0.5 * count * np.log(np.maximum(total, 1e-12) / np.maximum(within, 1e-12))
     # one phase and size of every recording that is fitted
