@@ -31,6 +31,7 @@ def course_candidates(
     possible: Callable[[Candidate], bool],
     significant: Callable[[float, Candidate], bool],
     least: float,
+    among: Callable[[Candidate], bool] = lambda _: True,
 ) -> list[list[Candidate]]:
     """Of every kind that may change steadily, its terms that do so.
 
@@ -49,6 +50,8 @@ def course_candidates(
     least : float
         Squared error that an effect must remove, in units of the noise, in addition to that which
         it removes with constant size, also in the best part of the recordings.
+    among : callable, optional
+        Function that returns whether an effect of all recordings is tried; all by default.
     """
     names = tuple(map(int, problem.rows.recordings))
     signals = problem.signals
@@ -60,7 +63,8 @@ def course_candidates(
     over = _Course(problem, ends, passed[:-1], passed[1:])
     scan = PartScan(tester)
     found: dict[str, list[Candidate]] = {}
-    for whole in everywhere(problem, [kind for kind in kinds if get_effect(kind).drifts]):
+    drifting = [kind for kind in kinds if get_effect(kind).drifts]
+    for whole in filter(among, everywhere(problem, drifting)):
         constant = tester.estimate(whole.rows)[1]
         tried = [(over, names)] * (len(names) > 1) + [(within, names)]
         (part,) = scan.parts([whole])

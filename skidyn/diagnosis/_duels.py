@@ -111,7 +111,7 @@ class DuellingSearch(JudgingSearch):
             lambda c: (c.kind, c.joints),
             lambda c: joints.issuperset(c.joints) and c.kind != UNKNOWN,
         )
-        drops = {id(c): drop for c, drop in zip(self.pool, self.drops, strict=True)}
+        drops = {id(c): drop for c, drop in zip(self.ranked, self.drops, strict=True)}
         own = found.pop((kind, candidate.joints), None)
         least = np.inf if own is None else COMPARABLE * drops[id(own)]
         near = [c for c in found.values() if drops[id(c)] > least]

@@ -250,7 +250,7 @@ def part_candidates(
     significant: Callable[[float, Candidate], bool],
     refined: Callable[[Candidate], Candidate],
     least: float,
-) -> list[list[Candidate]]:
+) -> tuple[list[list[Candidate]], set[int]]:
     """Of every kind and form, its terms in the best part of the recordings.
 
     Parameters
@@ -265,10 +265,17 @@ def part_candidates(
         Function that returns a candidate with its shape refined.
     least : float
         Squared error that an effect must remove, in units of the noise.
+
+    Returns
+    -------
+    explanations : list of list of Candidate
+        Best first.
+    joints : set of int
+        Joints, from 0, with an effect that is significant in any part.
     """
     problem, scan = tester.problem, PartScan(tester)
     if len(scan.names) < FEWEST:
-        return []
+        return [], set()
     sites: dict[tuple[_Form, tuple[int, ...]], list[tuple[float, Candidate]]] = defaultdict(list)
     for rough, candidate in zip(scan.roughly(pool).tolist(), pool, strict=True):
         if rough > least:
@@ -303,7 +310,8 @@ def part_candidates(
         settled = _settled(scan, refined, part, inside) if near else (part.drop, inside)
         found[form].append(settled)
     best_first = sorted(found.values(), key=lambda of_form: -max(drop for drop, _ in of_form))
-    return [_same_part(tester, of_form) for of_form in best_first]
+    joints = {j for _, _, inside in offered for j in inside.rows}
+    return [_same_part(tester, of_form) for of_form in best_first], joints
 
 
 def _settled(

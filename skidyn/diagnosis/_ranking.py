@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from skidyn.diagnosis._hypothesis import (
     some_recordings,
     within_recordings,
 )
+from skidyn.diagnosis._looked_at import LookedAt
 from skidyn.diagnosis._parts import part_candidates
 from skidyn.diagnosis._periodic import find_periodic
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
@@ -60,11 +62,13 @@ class RankingSearch(RecordingSearch):
 
     def rank(self) -> list[Hypothesis]:
         """Explanations of the residual, best first."""
-        screening, recordings = self._screening(), self.by_kind_of_recording()
+        screening, recordings = self._screening(self.looked), self.by_kind_of_recording()
         once = [self._lines, self._splits, self._parts, self._spans, self._courses]
         looks: list[Callable[[], Any]] = [*once, self.in_every_recording, *screening, *recordings]
         text = f"{self._round}: screening effects"
-        lines, splits, parts, spans, courses, sizes, *found = each(lambda look: look(), looks, text)
+        lines, splits, (parts, in_parts), spans, courses, sizes, *found = each(
+            lambda look: look(), looks, text
+        )
         rough = sorted(self._found(found[: len(screening)]) + splits, key=lambda item: item[1])
         ranking = self._finals([candidates for candidates, _ in rough[: self.settings.finalists]])
         ranking += [self._against_functions(h, ranking) for h in lines]
@@ -72,6 +76,11 @@ class RankingSearch(RecordingSearch):
         ranking += self._finals(parts, refined=0)  # their shapes are refined already
         ranking += self._finals([*spans, *courses, *sizes], refined=0)
         ranking += self._other_forms(ranking)
+        self.looked.keep("lines", chain.from_iterable(h.joints for h in lines))
+        self.looked.keep("parts", in_parts)
+        of_recordings = chain.from_iterable(found[len(screening) :])
+        for name, own in {"spans": spans, "courses": courses, "recordings": of_recordings}.items():
+            self.looked.keep(name, (j for part in own for c in part for j in c.rows))
         # The least specific explanations are last: differences between recordings, and vibration.
         return sorted(ranking, key=lambda h: (self._is_last(h, ranking), -h.score))
 
@@ -137,13 +146,13 @@ class RankingSearch(RecordingSearch):
     ) -> dict[Any, Candidate]:
         """Of each group of candidates, the one that alone removes most."""
         best: dict[Any, int] = {}
-        for i, candidate in enumerate(self.pool):
+        for i, candidate in enumerate(self.ranked):
             if not wanted(candidate):
                 continue
             key = group(candidate)
             if key not in best or self.drops[i] > self.drops[best[key]]:
                 best[key] = i
-        return {key: self.pool[i] for key, i in best.items()}
+        return {key: self.ranked[i] for key, i in best.items()}
 
     def _holds_in_all(self, own: Hypothesis, ranking: Sequence[Hypothesis]) -> bool:
         """Whether an effect common to all recordings explains nearly as much as separate ones."""
@@ -160,37 +169,55 @@ class RankingSearch(RecordingSearch):
 
     def _greedy_by_kind(self, nameless: bool = True) -> list[tuple[list[Candidate], float]]:
         """For each kind, terms added joint by joint while each reduces the held-out error."""
-        return self._found(each(lambda look: look(), self._screening(nameless)))
+        looks = self._screening(self.looked_alone, nameless)
+        return self._found(each(lambda look: look(), looks))
 
     def _found(self, greedy: Iterable[_Greedy]) -> list[tuple[list[Candidate], float]]:
         """Added candidates of every kind, and minus their gain."""
-        rough = [([self.pool[i] for i in places], drop) for places, drop in greedy if places]
+        rough = [([self.ranked[i] for i in places], drop) for places, drop in greedy if places]
         return [(own, -(drop - 2 * sum(c.width for c in own))) for own, drop in rough]
 
-    def _screening(self, nameless: bool = True) -> list[Callable[[], _Greedy]]:
+    def _screening(self, looked: LookedAt, nameless: bool = True) -> list[Callable[[], _Greedy]]:
         """One result for each kind, and one for products of signals.
 
         These have a single coefficient, so that a function that explains more seems more expensive
         as long as the noise is not known.
         """
-        kinds = np.array([c.kind if c.n_chosen == 1 else PRODUCTS for c in self.pool])
-        within = np.array([self.is_judged_within(c) for c in self.pool], dtype=bool)
         tester = self.tester(self.chosen)
-        self.drops = np.full(len(self.pool), -np.inf)
+        looked.compare([r * s for r, s in zip(tester.residual, self.sigma, strict=True)])
+        pool = self.pool if nameless else [c for c in self.pool if c.kind != UNKNOWN]
+        self.ranked = list(filter(looked.is_open, pool))
+        kinds = np.array([c.kind if c.n_chosen == 1 else PRODUCTS for c in self.ranked])
+        within = np.array([self.is_judged_within(c) for c in self.ranked], dtype=bool)
+        self.drops = np.full(len(self.ranked), -np.inf)
         looks: list[Callable[[], _Greedy]] = []
         for wanted, inside in ((~within, False), (within, True)):
             if not wanted.any():
                 continue
-            screen = Screen(self.problem, self.sigma, self.pool, self.target, within=inside)
+            screen = Screen(self.problem, self.sigma, self.ranked, self.target, within=inside)
             base = screen.model(self.blocks)
-            first = screen.step(base, wanted)
-            self.drops[wanted] = base.errors.sum() - first[wanted].sum(1)
+            first, drops = self._stepped(screen, base, wanted)
+            self.drops[wanted] = drops[wanted]
             looks += [
                 partial(self._greedy, screen, wanted & (kinds == kind), base, first, tester)
                 for kind in dict.fromkeys(kinds[wanted])
-                if nameless or kind not in (UNKNOWN, PRODUCTS)
             ]
+        looked.keep_weak(self.ranked, self.drops, self.settings.least_gain)
         return looks
+
+    def _stepped(self, screen: Screen, model: Model, wanted: Mask) -> tuple[Array, Array]:
+        """Held-out errors of candidates that may remove enough, and what each removes.
+
+        What removes too little from the error of all rows removes even less if folds are held out:
+        for it, the usual difference of twice the number of coefficients is assumed.
+        """
+        removed = screen.removed(model, wanted)
+        near = removed - screen.widths > self.settings.least_share * screen.n_rows
+        errors = screen.step(model, near)
+        held_out = model.errors.sum() - errors[near].sum(1)
+        drops = removed - 2.0 * screen.widths
+        drops[near] = held_out
+        return errors, drops
 
     def _greedy(
         self, screen: Screen, wanted: Mask, base: Model, first: Array, tester: Tester
@@ -202,23 +229,25 @@ class RankingSearch(RecordingSearch):
         further = self.settings.least_gain * screen.further_forms
         while pool.any():
             drops = np.where(pool, now.sum() - errors.sum(1), -np.inf)
+            if not np.isfinite(drops).any():
+                break
             # Unknown functions have very different numbers of coefficients: each coefficient has a
             # penalty, in units of the noise left by the best of them.
             price = 2.0
-            if self.pool[int(np.argmax(drops))].kind == UNKNOWN:
-                price = self._price([self.pool[int(np.argmax(drops))]], chosen) / 3
+            if self.ranked[int(np.argmax(drops))].kind == UNKNOWN:
+                price = self._price([self.ranked[int(np.argmax(drops))]], chosen) / 3
             order = drops - price * screen.widths - further
             found = self._first_significant(drops, order, tester, chosen)
             if found is None:
                 break
-            candidate = self.pool[found]
+            candidate = self.ranked[found]
             index.append(found)
             chosen.append(candidate)
             now = errors[found]
             pool &= self._still_open(candidate, chosen)
             if pool.any():
                 model = screen.beside(model, candidate.rows)
-                errors = screen.step(model, pool)
+                errors, _ = self._stepped(screen, model, pool)
                 tester = self.tester([*self.chosen, *chosen])
         return index, float(base.errors.sum() - now.sum())
 
@@ -233,7 +262,7 @@ class RankingSearch(RecordingSearch):
         """
         near: dict[frozenset[str], int] = {}
         for i in map(int, np.argsort(-order)[: self.settings.shapes_tested]):
-            candidate = self.pool[i]
+            candidate = self.ranked[i]
             n_rows = int(self.problem.rows.counts[list(candidate.joints)].sum())
             if not drops[i] > self.settings.least_share * n_rows:
                 continue
@@ -246,7 +275,7 @@ class RankingSearch(RecordingSearch):
                 near.setdefault(names, i)
         model = self.blocks_with([*self.chosen, *chosen]) if near else []
         for i in near.values():
-            (refined,) = refine(self.problem, model, [self.pool[i]], self.sigma, self.target)
+            (refined,) = refine(self.problem, model, [self.ranked[i]], self.sigma, self.target)
             chance = tester.test(refined.rows, refined.zeros).chance
             if self.significant(chance, refined):
                 return i
@@ -255,20 +284,20 @@ class RankingSearch(RecordingSearch):
     def _still_open(self, added: Candidate, chosen: list[Candidate]) -> Mask:
         """Candidates that may be added to one of the same kind."""
         if len(added.joints) == self.problem.n_joints and self.problem.n_joints > 1:
-            return np.zeros(len(self.pool), dtype=bool)  # acts on the whole robot already
+            return np.zeros(len(self.ranked), dtype=bool)  # acts on the whole robot already
         if added.kind == UNKNOWN:
             same = set(added.variables)
             if len(chosen) >= 3:
-                return np.zeros(len(self.pool), dtype=bool)
+                return np.zeros(len(self.ranked), dtype=bool)
             return np.array(
-                [c.joints != added.joints and set(c.variables) == same for c in self.pool]
+                [c.joints != added.joints and set(c.variables) == same for c in self.ranked]
             )
         taken = {c.joints for c in chosen}
         whole = self.problem.n_joints > 1
         return np.array(
             [
                 c.joints not in taken and not (whole and len(c.joints) == self.problem.n_joints)
-                for c in self.pool
+                for c in self.ranked
             ]
         )
 
@@ -307,8 +336,16 @@ class RankingSearch(RecordingSearch):
         carries = tester.test(other.rows).coefficients
         return other if carries[0] > 0 or (fewer and other.allows(carries)) else candidate
 
-    def _parts(self) -> list[list[Candidate]]:
-        """Effects of a part of the recordings, those that may be possible."""
+    def _may_be_found(self, look: str) -> Callable[[Candidate], bool]:
+        """Whether a candidate acts on a joint at which a look may find something."""
+        joints = self.looked.joints(look)
+        return lambda candidate: not joints.isdisjoint(candidate.rows)
+
+    def _parts(self) -> tuple[list[list[Candidate]], set[int]]:
+        """Effects of a part of the recordings, those that may be possible, and their joints.
+
+        The joints are those of all effects that are significant in any part.
+        """
 
         def refined(candidate: Candidate) -> Candidate:
             return refine(self.problem, self.blocks, [candidate], self.sigma, self.target)[0]
@@ -319,8 +356,9 @@ class RankingSearch(RecordingSearch):
         changed = {c.joints for c in self.chosen if c.kind == DRIFT and some_recordings(c)}
         pool += own_effects(self.problem, self.kinds)
         pool = [c for c in pool if c.kind not in FRICTION or c.joints not in changed]
-        found = part_candidates(pool, tester, self.significant, refined, least)
-        return [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
+        pool = list(filter(self._may_be_found("parts"), pool))
+        found, joints = part_candidates(pool, tester, self.significant, refined, least)
+        return [own for own in found if all(self.can_be(c, self.chosen) for c in own)], joints
 
     def _spans(self) -> list[list[Candidate]]:
         """Effects that begin or end within recordings, those that may be possible."""
@@ -328,7 +366,8 @@ class RankingSearch(RecordingSearch):
         # intervals of their own for the same kind again would follow any torque
         already = {c.kind for c in self.chosen if c.term.spans}
         kinds = [kind for kind in self.kinds if kind not in already]
-        found = span_candidates(self.problem, kinds, tester, self.significant, least)
+        among = self._may_be_found("spans")
+        found = span_candidates(self.problem, kinds, tester, self.significant, least, among)
         found = [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
         return [self._in_time(own) for own in found if not self._follows_one_joint(tester, own)]
 
@@ -362,8 +401,10 @@ class RankingSearch(RecordingSearch):
         tester, least = self.tester(self.chosen), self.settings.least_gain
         already = {c.kind for c in self.chosen if c.term.course}
         kinds = [kind for kind in self.kinds if kind not in already]
-        possible = partial(self.can_be, others=self.chosen)
-        return course_candidates(self.problem, kinds, tester, possible, self.significant, least)
+        possible, among = partial(self.can_be, others=self.chosen), self._may_be_found("courses")
+        return course_candidates(
+            self.problem, kinds, tester, possible, self.significant, least, among
+        )
 
     def _finals(self, rough: list[list[Candidate]], refined: int | None = None) -> list[Hypothesis]:
         """Compare the best kinds with re-estimated noise, the first of them with refined shapes."""
@@ -425,11 +466,11 @@ class RankingSearch(RecordingSearch):
             return []
         problem = self.problem
         residual = self.residual
-        found = []
+        found, joints = [], sorted(self.looked.joints("lines"))
         least = self.settings.least_share
         if "torque_ripple" in self.kinds:
-            lines = find_lines(problem, residual, self.significant)
-            free = [j for j in range(problem.n_joints) if not self._harmonic(j)]
+            lines = find_lines(problem, residual, self.significant, joints)
+            free = [j for j in joints if not self._harmonic(j)]
             sines = np.zeros(problem.n_joints)
             for line in lines:
                 sines[line.joint] = max(sines[line.joint], line.gain.sum())
@@ -441,7 +482,7 @@ class RankingSearch(RecordingSearch):
         if self.vibration:
             # On samples, which are far more than rows.
             least = self.settings.least_drop * len(residual) / max(1, problem.rows.counts.max())
-            lines = find_vibrations(problem, residual, self.significant)
+            lines = find_vibrations(problem, residual, self.significant, joints)
             found.append(self._of_lines(UNKNOWN, "frequency", 0.1, lines, least))
         return [h for h in found if h is not None]
 

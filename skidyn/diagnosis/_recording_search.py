@@ -19,9 +19,11 @@ class RecordingSearch(SearchState):
 
     def by_kind_of_recording(self) -> list[Callable[[], list[list[Candidate]]]]:
         """Changes between recordings for each kind."""
+        joints = self.looked.joints("recordings")
+        open_to = [c for c in self.by_recording if not joints.isdisjoint(c.rows)]
 
         def look(kind: str) -> list[list[Candidate]]:
-            pool = [c for c in self.by_recording if c.kind == kind]
+            pool = [c for c in open_to if c.kind == kind]
             chosen = choose(pool, lambda more: self.tester([*self.chosen, *more]), self.significant)
             chosen = [
                 c
@@ -32,7 +34,7 @@ class RecordingSearch(SearchState):
 
         known = {c.kind for c in self.chosen if some_recordings(c)}
         known |= set(FRICTION) if DRIFT in known else set()
-        kinds = dict.fromkeys(c.kind for c in self.by_recording)
+        kinds = dict.fromkeys(c.kind for c in open_to)
         return [partial(look, kind) for kind in kinds if kind not in known]
 
     def can_be(self, candidate: Candidate, others: Sequence[Candidate]) -> bool:

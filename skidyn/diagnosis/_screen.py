@@ -100,6 +100,12 @@ class Screen:
         return np.array([c.width for c in self.candidates])
 
     @cached_property
+    def n_rows(self) -> NDArray[np.int64]:
+        """Number of rows of the joints of every candidate, (n_candidates,)."""
+        counts = self.problem.rows.counts
+        return np.array([counts[list(c.joints)].sum() for c in self.candidates])
+
+    @cached_property
     def further_forms(self) -> Array:
         """1 for candidates in a further form of their kind, else 0; (n_candidates,)."""
         return np.array([float(c.is_further_form) for c in self.candidates])
@@ -156,17 +162,58 @@ class Screen:
             felt[j] = felt[j].with_columns(start, scaled)
         return Model(felt, gram, cross, model.square, (*model.widths, k))
 
-    def step(self, model: Model, wanted: NDArray[np.bool_] | None = None) -> Array:
+    def removed(self, model: Model, wanted: NDArray[np.bool_]) -> Array:
+        """Squared error that each candidate removes in a fit to all folds, (n_candidates,).
+
+        It takes a small part of the time of :meth:`step`, and no held-out error falls by more. It
+        is minus infinity for candidates that are not ``wanted``, and for those with physically
+        impossible coefficients.
+        """
+        removed = np.full(len(self.candidates), -np.inf)
+        for own in each(partial(self._removed, model), self._in_parts(wanted)):
+            for index, drops in own:
+                removed[index] = drops
+        return removed
+
+    def step(self, model: Model, wanted: NDArray[np.bool_]) -> Array:
         """Held-out error of every fold after each candidate is added, (n_candidates, n_folds).
 
-        It is infinite for candidates that are not ``wanted``, and for those with physically
-        impossible coefficients.
+        It is infinite for candidates that are not ``wanted``.
         """
         errors = np.full((len(self.candidates), self.n_folds), np.inf)
         found = each(partial(self._errors, model, model.bends), self._in_parts(wanted))
         for index, own in chain.from_iterable(found):
             errors[index] = own
         return errors
+
+    def _removed(self, model: Model, some: list[_Wanted]) -> list[tuple[NDArray[np.int64], Array]]:
+        """Some candidates of each group, and the squared error that they remove."""
+        found = []
+        for group, pick in some:
+            k, (first, *others) = group.width, group.joints
+            own, target = np.zeros((len(pick), k, k)), np.zeros(len(pick) * k)
+            # the columns of the model that one joint feels are few of all
+            places = model.felt[first].places
+            if others:
+                places = np.arange(model.cross.shape[1])
+            cross = np.zeros((len(places), len(pick) * k))
+            for j in group.joints:
+                columns = self._columns(group, pick, j)
+                apart = columns.reshape(len(pick), k, -1)
+                own += apart @ apart.transpose(0, 2, 1)
+                target += columns @ self.target[j]
+                felt = model.felt[j]
+                cross[felt.places if others else slice(None)] += felt.rows.T @ columns.T
+            mimic = model.inverse[np.ix_(places, places)] @ cross
+            along = model.solution[places] @ cross
+            swept = _Swept(cross[None], cross[None], mimic[None], along[None])
+            ridge = np.einsum("ckk->ck", own).max(1, keepdims=True) * group.soft[pick, None]
+            gain, slope = swept.gain(own[None], target[None], ridge)
+            lowest, limits = group.lowest[pick], group.limits[pick]
+            forbidden = (gain[0] < lowest) | (np.abs(gain[0]) > limits)
+            drops = np.sum(gain[0] * slope[0], axis=1)
+            found.append((group.index[pick], np.where(forbidden.any(axis=1), -np.inf, drops)))
+        return found
 
     def _errors(
         self, model: Model, bends: Array, some: list[_Wanted]
@@ -182,17 +229,15 @@ class Screen:
             place = slice(end - part.cross.shape[2], end)
             ridge = np.einsum("fckk->ck", own).max(1, keepdims=True) * group.soft[pick, None]
             ridge = np.broadcast_to(ridge, (len(pick), group.width))
-            beside = swept.part(place)
-            errors = beside.errors(model, own, target, ridge, bent[:, :, place]).T
-            lowest, limits = group.lowest[pick], group.limits[pick]
-            if np.isfinite(lowest).any() or np.isfinite(limits).any():
-                gain = _Swept.whole(model, beside.cross).gain(
-                    own.sum(0, keepdims=True), target.sum(0, keepdims=True), ridge
-                )[0]
-                forbidden = (gain < lowest) | (np.abs(gain) > limits)
-                errors[forbidden.any(axis=1)] = np.inf
+            errors = swept.part(place).errors(model, own, target, ridge, bent[:, :, place]).T
             found.append((group.index[pick], errors))
         return found
+
+    def _columns(self, group: _Group, pick: NDArray[np.int64], joint: int) -> Array:
+        """Columns of some candidates in units of the noise, (n_columns, n_rows)."""
+        columns = side_by_side([self.candidates[i].rows[joint] for i in group.index[pick]])
+        columns /= self.sigma[joint]
+        return columns
 
     def _products_of(self, model: Model, group: _Group, pick: NDArray[np.int64]) -> _Columns:
         """Products of some candidates' columns, which are stacked only temporarily."""
@@ -201,8 +246,7 @@ class Screen:
         target = np.zeros((n_folds, len(pick) * k))
         cross = np.zeros((*model.cross.shape, len(pick) * k))
         for j in group.joints:
-            columns = side_by_side([self.candidates[i].rows[j] for i in group.index[pick]])
-            columns /= self.sigma[j]
+            columns = self._columns(group, pick, j)
             felt = model.felt[j]
             for f, here in enumerate(self.folds[j]):
                 part = columns[:, here]
@@ -212,14 +256,12 @@ class Screen:
                 cross[f, felt.places] += felt.rows[here].T @ part.T
         return _Columns(cross, own, target)
 
-    def _in_parts(self, wanted: NDArray[np.bool_] | None) -> Iterator[list[_Wanted]]:
+    def _in_parts(self, wanted: NDArray[np.bool_]) -> Iterator[list[_Wanted]]:
         """Wanted candidates by group, some hundreds of columns at a time."""
         some: list[_Wanted] = []
         count = 0
         for group in self._groups:
-            pick = np.arange(len(group.index))
-            if wanted is not None:
-                pick = pick[wanted[group.index]]
+            pick = np.flatnonzero(wanted[group.index])
             most = max(1, MOST_COLUMNS // group.width)
             for start in range(0, len(pick), most):
                 some.append((group, pick[start : start + most]))
@@ -358,13 +400,6 @@ class _Swept:
         along = np.matmul(model.solutions[:, None], rest)[:, 0]
         return cls(cross, rest, np.matmul(model.inverses, rest), along)
 
-    @classmethod
-    def whole(cls, model: Model, cross: Array) -> _Swept:
-        """For the fit to all folds."""
-        rest = cross.sum(0, keepdims=True)
-        along = np.matmul(model.solution, rest)
-        return cls(cross, rest, np.matmul(model.inverse, rest), along)
-
     def part(self, place: slice) -> _Swept:
         """Some of the columns."""
         return _Swept(
@@ -374,8 +409,10 @@ class _Swept:
             self.along[:, place],
         )
 
-    def gain(self, own: Array, target: Array, ridge: Array) -> Array:
-        """Coefficients of every candidate added to the model, (n_fits, n_candidates, k).
+    def gain(self, own: Array, target: Array, ridge: Array) -> tuple[Array, Array]:
+        """Coefficients of every candidate added to the model, and slopes of the error before.
+
+        Both have the shape (n_fits, n_candidates, k).
 
         Parameters
         ----------
@@ -392,8 +429,8 @@ class _Swept:
         size = np.where(size > 0, size, 1 / (CANDIDATE_RIDGE * TINY))  # no row at all here
         added = CANDIDATE_RIDGE * (diagonal + TINY * size) + ridge
         block = own - _products(self.rest, self.mimic, k) + np.eye(k) * added[:, :, None, :]
-        gradient = (target - self.along).reshape(*diagonal.shape, 1)
-        return np.asarray(np.linalg.solve(block, gradient)[:, :, :, 0])
+        slope = (target - self.along).reshape(diagonal.shape)
+        return np.linalg.solve(block, slope[..., None])[..., 0], slope
 
     def errors(self, model: Model, own: Array, target: Array, ridge: Array, bent: Array) -> Array:
         """Held-out error of every fold for the candidates of a group, (n_folds, n_candidates).
@@ -408,7 +445,7 @@ class _Swept:
             Product of :attr:`Model.bends` and :attr:`rest`.
         """
         k, b = own.shape[2], model.solutions
-        gain = self.gain(own.sum(0) - own, target.sum(0) - target, ridge)
+        gain, _ = self.gain(own.sum(0) - own, target.sum(0) - target, ridge)
         # The same change evaluated on the held-out fold.
         left = model.cross - np.matmul(model.gram, b[:, :, None])[:, :, 0]
         slope = target - np.matmul(b[:, None], self.cross)[:, 0]

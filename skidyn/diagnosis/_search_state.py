@@ -17,6 +17,7 @@ from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
 from skidyn.diagnosis._held_out import shares_of_folds
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, terms_on_rows, uses_the_fit
 from skidyn.diagnosis._imitation import imitate
+from skidyn.diagnosis._looked_at import SAME, LookedAt
 from skidyn.diagnosis._nameless_candidates import nameless_candidates
 from skidyn.diagnosis._noise import sensor_noise
 from skidyn.diagnosis._profile import profile_error
@@ -26,10 +27,6 @@ from skidyn.diagnosis._rule import CONFINED, Settings, false_discovery_rate
 from skidyn.diagnosis._tester import Tester
 from skidyn.effects import Term
 from skidyn.evidence import Problem
-
-#: Share of a joint's squared residual up to which a change does not require a new search of
-#: signals.
-SAME = 1e-3
 
 
 class Kept(NamedTuple):
@@ -42,6 +39,7 @@ class Kept(NamedTuple):
     sigma: Array
     left: Array
     start: Array
+    ranked: list[Candidate]
     drops: Array
 
 
@@ -76,8 +74,11 @@ class SearchState:
         self.whole_pool = self.pool
         self._last = LastResults()
         self.start = self.left = np.zeros(problem.n_joints)
-        #: Held-out gain of each candidate of the pool, from the last screening.
+        #: Candidates that the last ranking compared, and the held-out gain of each.
+        self.ranked: list[Candidate] = []
         self.drops = np.zeros(0)
+        #: What earlier rankings found, and those of known effects alone.
+        self.looked, self.looked_alone = (LookedAt(problem.n_joints) for _ in range(2))
         self._reconsidering = False
         self._within: dict[Term, bool] = {}
 
@@ -143,6 +144,7 @@ class SearchState:
             self.sigma,
             self.left,
             self.start,
+            self.ranked,
             self.drops,
         )
 
@@ -185,6 +187,8 @@ class SearchState:
             return any((name, j) in changed for name in c.term.effect.needs for j in reads)
 
         pool = list(filter(is_stale, dict.fromkeys([*self.whole_pool, *self.by_recording])))
+        self.looked.forget(pool)
+        self.looked_alone.forget(pool)
         terms = [c.term for c in sorted(pool, key=lambda c: (c.term.effect.needs, c.joints))]
         rows = dict(zip(terms, self.problem.prepare(terms, screening=True), strict=True))
         for c in pool:

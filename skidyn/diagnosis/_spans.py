@@ -38,6 +38,7 @@ def span_candidates(
     tester: Tester,
     significant: Callable[[float, Candidate], bool],
     least: float,
+    among: Callable[[Candidate], bool] = lambda _: True,
 ) -> list[list[Candidate]]:
     """Of every kind that may differ between recordings, its terms that act in intervals.
 
@@ -54,6 +55,8 @@ def span_candidates(
     least : float
         Squared error that an effect must remove, in units of the noise, in addition to that which
         it removes in whole recordings.
+    among : callable, optional
+        Function that returns whether an effect of all recordings is tried; all by default.
     """
     times = _Times(problem)
     if len(times.names) < 2:
@@ -62,7 +65,7 @@ def span_candidates(
     found: dict[str, list[Candidate]] = defaultdict(list)
     effects = map(get_effect, kinds)
     passing = [e.kind for e in effects if e.by_recording or e.search == "trajectories"]
-    for whole in everywhere(problem, passing):
+    for whole in filter(among, everywhere(problem, passing)):
         best, drop = None, -np.inf
         (part,) = scan.parts([whole])
         recordings = None if part is None else part.recordings

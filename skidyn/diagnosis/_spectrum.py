@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -77,7 +77,10 @@ def _any(chance: float) -> bool:
 
 
 def find_lines(
-    problem: Problem, residual: Array, significant: Callable[[float], bool] = _any
+    problem: Problem,
+    residual: Array,
+    significant: Callable[[float], bool] = _any,
+    joints: Iterable[int] | None = None,
 ) -> list[Line]:
     """The strongest significant lines of each joint above the local noise level.
 
@@ -89,10 +92,12 @@ def find_lines(
         Measured torque less the model.
     significant : callable, optional
         Whether a line of a chance is wanted; all by default.
+    joints : iterable of int, optional
+        Joints, from 0; all by default.
     """
     fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
     lines = []
-    for joint in range(problem.n_joints):
+    for joint in range(problem.n_joints) if joints is None else joints:
         use = problem.rows.sliding[:, joint]
         if use.sum() < 100:
             continue
@@ -150,7 +155,10 @@ def _in_part(
 
 
 def find_vibrations(
-    problem: Problem, residual: Array, significant: Callable[[float], bool] = _any
+    problem: Problem,
+    residual: Array,
+    significant: Callable[[float], bool] = _any,
+    joints: Iterable[int] | None = None,
 ) -> list[Line]:
     """The strongest wave in time of each joint that is too fast for averaged rows.
 
@@ -162,12 +170,14 @@ def find_vibrations(
         Measured torque less the model.
     significant : callable, optional
         Whether a line of a chance is wanted; all by default.
+    joints : iterable of int, optional
+        Joints, from 0; all by default.
     """
     signals, lines = problem.signals, []
     if signals.time is None:
         return []
     fold = problem.sample_folds(int(np.argmax(problem.rows.counts)))
-    for joint in range(problem.n_joints):
+    for joint in range(problem.n_joints) if joints is None else joints:
         use, r = problem.rows.sliding[:, joint], residual[:, joint]
         found = clock_line(signals, r, use, problem.signals.rate, (SLOWEST, np.inf))
         if found is not None and significant(found.chance):
