@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Independent tasks on several cores, with exactly the same results as on one.
 
-A forked process shares all data computed so far without a copy, and starts within milliseconds; its
-results are returned through a pipe. Tasks are distributed one by one, so that no process waits
-while another has several left. Every task is computed by the same instructions in any process.
-Forking is safe on Linux while linear algebra is held to one thread, as
-:func:`skidyn.diagnosis.diagnose` does; elsewhere all work is done in one process.
+A forked process shares all data computed so far without a copy, and starts within milliseconds.
+Arrays of its results are returned in memory that both processes have, the rest through a pipe.
+Tasks are distributed one by one, so that no process waits while another has several left. Every
+task is computed by the same instructions in any process. Forking is safe on Linux while linear
+algebra is held to one thread, as :func:`skidyn.diagnosis.diagnose` does; elsewhere all work is done
+in one process.
 """
 
 from __future__ import annotations
 
 import gc
+import mmap
 import os
+import pickle
 import signal
 import struct
 import sys
@@ -19,6 +22,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from skidyn._progress import listening, tell, track
@@ -37,6 +41,8 @@ MOST_PROCESSES = 8
 #: Number of task numbers that fit into a pipe; processes read them one after another.
 MOST_PIECES = 4096
 _NUMBER = struct.Struct("=I")
+#: Bytes at multiples of which arrays begin in memory.
+_ALIGNED = 64
 
 
 @contextmanager
@@ -163,7 +169,9 @@ class _Child(Generic[Result]):
 
         fork = get_context("fork")
         self._pipe, into = fork.Pipe(duplex=False)
-        self._process = fork.Process(target=_answer, args=(function, into), daemon=True)
+        self._memory = os.memfd_create("skidyn")
+        answer = function, into, self._memory
+        self._process = fork.Process(target=_answer, args=answer, daemon=True)
         try:
             with warnings.catch_warnings():
                 # Python 3.12 warns of any other thread, including idle ones of linear algebra.
@@ -171,6 +179,7 @@ class _Child(Generic[Result]):
                 self._process.start()
         except OSError:
             self._pipe.close()
+            os.close(self._memory)
             raise
         finally:
             into.close()
@@ -183,9 +192,10 @@ class _Child(Generic[Result]):
     def result(self) -> Result | None:
         """The result; None if the process ended without one."""
         try:
-            fine, value = self._pipe.recv()
+            pickled, sizes = self._pipe.recv()
         except (EOFError, OSError):  # before or within an answer
             return None
+        fine, value = pickle.loads(pickled, buffers=_mapped(self._memory, sizes))
         if not fine:
             raise value
         return value  # type: ignore[no-any-return]
@@ -193,11 +203,12 @@ class _Child(Generic[Result]):
     def end(self) -> None:
         """End the process if it still runs."""
         self._pipe.close()
+        os.close(self._memory)
         self._process.kill()
         self._process.join()
 
 
-def _answer(function: Callable[[], Result], into: Connection) -> None:
+def _answer(function: Callable[[], Result], into: Connection, memory: int) -> None:
     """Main function of a child process: compute, and send the result or the exception."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     gc.disable()  # a collection would copy every page with an object
@@ -207,7 +218,29 @@ def _answer(function: Callable[[], Result], into: Connection) -> None:
             outcome: tuple[bool, Any] = True, function()
         except Exception as error:
             outcome = False, error
-    into.send(outcome)
+    arrays: list[pickle.PickleBuffer] = []
+    pickled = pickle.dumps(outcome, protocol=5, buffer_callback=arrays.append)
+    sizes: list[int] = []
+    with open(memory, "wb", closefd=False) as file:
+        for array in arrays:
+            file.seek(sum(map(_aligned, sizes)))
+            sizes.append(file.write(array.raw()))
+    into.send((pickled, sizes))
+
+
+def _mapped(memory: int, sizes: list[int]) -> list[memoryview]:
+    """Arrays in the memory of a process, of which the pages are copied only if they are changed."""
+    total = sum(map(_aligned, sizes))
+    if not total:
+        return []
+    os.ftruncate(memory, total)
+    whole = memoryview(mmap.mmap(memory, total, mmap.MAP_PRIVATE))
+    starts = accumulate(map(_aligned, sizes), initial=0)
+    return [whole[start : start + size] for start, size in zip(starts, sizes, strict=False)]
+
+
+def _aligned(size: int) -> int:
+    return -(-size // _ALIGNED) * _ALIGNED
 
 
 def _started(function: Callable[[], Result]) -> _Child[Result] | None:

@@ -15,6 +15,7 @@ from skidyn.diagnosis._hypothesis import UNKNOWN
 from skidyn.diagnosis._spectrum import SLOWEST
 from skidyn.effects import (
     ClockPeriodic,
+    Effect,
     FunctionOfSignals,
     FunctionOfSum,
     NamelessEffect,
@@ -56,23 +57,31 @@ def nameless_candidates(
 
     looked_at = range(problem.n_joints) if followed_on is None else followed_on
 
-    def follow(j: int) -> Followed:
-        return followed_signals(problem, j, residual[:, j])
+    kinds = [effect for effect in map(get_effect, nameless_kinds()) if effect.search != "spectrum"]
+
+    def follow(j: int) -> tuple[Followed, dict[str, list[dict[str, Any]]]]:
+        found = followed_signals(problem, j, residual[:, j])
+        if followed_on is not None:
+            return found, {}
+        return found, {e.kind: _waves(problem, e, j, residual) for e in kinds}
 
     found = each(follow, looked_at)
     followed = dict(zip(looked_at, found, strict=True))
     made: list[tuple[Term, tuple[str, ...], int]] = []
-    for kind in nameless_kinds():
-        effect = get_effect(kind)
+    for effect in kinds:
         assert isinstance(effect, NamelessEffect)
         for joints in effect.sites(problem.few):
             joint = joints[0]
-            if effect.search == "spectrum" or effect.not_shown(problem.few, joint):
+            if effect.not_shown(problem.few, joint):
                 continue
             if followed_on is not None and (effect.search != "screened" or joint not in followed):
                 continue
-            for shape, among in _shapes(problem, effect, joints, residual, followed[joint]):
-                made.append((Term.at(kind, joints, shape), effect.variables(joint, shape), among))
+            own, waves = followed[joint]
+            shapes = _shapes(problem, effect, joints, own)
+            shapes += [(shape, 1) for shape in waves.get(effect.kind, ())]
+            for shape, among in shapes:
+                term = Term.at(effect.kind, joints, shape)
+                made.append((term, effect.variables(joint, shape), among))
     all_rows = problem.prepare([term for term, *_ in made], screening=True)
     return [
         Candidate(UNKNOWN, term, rows, names, len(term.effect.shapes), n_chosen=among)
@@ -84,7 +93,6 @@ def _shapes(
     problem: Problem,
     effect: NamelessEffect,
     joints: tuple[int, ...],
-    residual: Array,
     followed: Followed,
 ) -> list[tuple[dict[str, Any], int]]:
     """Shapes of an effect that are tried, each with the number among which it was chosen."""
@@ -103,13 +111,20 @@ def _shapes(
     elif isinstance(effect, FunctionOfSum):
         shapes = [effect.shape_of(few, *of) for of in followed.sums]
     elif isinstance(effect, ClockPeriodic):
-        shapes = slow_lines(
-            problem.signals,
-            residual[:, joints[0]],
-            effect.carriers(problem.signals, joints[0]),
-            problem.rows.sliding[:, joints[0]],
-            (LOWEST, SLOWEST),
-        )
+        shapes = []  # those of :func:`_waves`
     else:
         shapes = effect.grid(few, joints)
     return [(shape, 1) for shape in shapes]
+
+
+def _waves(problem: Problem, effect: Effect, joint: int, residual: Array) -> list[dict[str, Any]]:
+    """Shapes of an effect that is periodic in time on a joint; none of other effects."""
+    if not isinstance(effect, ClockPeriodic) or effect.not_shown(problem.few, joint):
+        return []
+    return slow_lines(
+        problem.signals,
+        residual[:, joint],
+        effect.carriers(problem.signals, joint),
+        problem.rows.sliding[:, joint],
+        (LOWEST, SLOWEST),
+    )

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._cores import each
-from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._courses import course_candidates
@@ -44,7 +43,7 @@ from skidyn.diagnosis._rule import (
 from skidyn.diagnosis._screen import Model, Screen
 from skidyn.diagnosis._spans import FOLLOWS_ANY, span_candidates
 from skidyn.diagnosis._spectrum import Line, find_lines, find_vibrations
-from skidyn.diagnosis._split import recordings_with, split_effects
+from skidyn.diagnosis._split import prepare_splits, recordings_with, split_effects
 from skidyn.diagnosis._tester import Tester
 from skidyn.effects import SizeByRecording, get_effect
 
@@ -63,6 +62,7 @@ class RankingSearch(RecordingSearch):
     def rank(self) -> list[Hypothesis]:
         """Explanations of the residual, best first."""
         screening, recordings = self._screening(self.looked), self.by_kind_of_recording()
+        prepare_splits(self.problem, self.kinds)  # once, and not in each of the processes
         once = [self._lines, self._splits, self._parts, self._spans, self._courses]
         looks: list[Callable[[], Any]] = [*once, self.in_every_recording, *screening, *recordings]
         text = f"{self._round}: screening effects"
@@ -408,40 +408,42 @@ class RankingSearch(RecordingSearch):
 
     def _finals(self, rough: list[list[Candidate]], refined: int | None = None) -> list[Hypothesis]:
         """Compare the best kinds with re-estimated noise, the first of them with refined shapes."""
-        if not rough:
-            return []
         refined = self.settings.refined if refined is None else refined
-        ranking = []
-        for i, candidates in enumerate(track(rough, f"{self._round}: refining the best")):
-            kind = candidates[0].kind
-            candidates = [replace(c, rows=self.problem.term_rows(c.term)) for c in candidates]
-            within = any(map(self.is_judged_within, candidates))
-            hypothesis = Hypothesis(kind, tuple(candidates), np.zeros(0), 0.0, 0)
-            if i < refined and any(c.n_shapes for c in candidates):
-                candidates, after = self._refined(candidates, within)
-                hypothesis = replace(hypothesis, candidates=tuple(candidates))
-                beside = [[o for o in candidates if o is not c] for c in candidates]
-                if not all(
-                    self.can_be(c, [*self.chosen, *rest])
-                    for c, rest in zip(candidates, beside, strict=True)
-                ):
-                    continue
-            else:
-                after = self._errors(hypothesis, within)
-            before = self.errors_now(within)
-            gain = log_likelihood_gain(before, after, self.problem.rows.counts)
-            count = self._n_parameters(candidates)
-            price = 2 * self._price(candidates)
-            score = float(gain.sum()) - price * count
-            if hypothesis.is_further_form:
-                score -= self.settings.least_gain
-            if kind == UNKNOWN and not in_part(hypothesis):
-                # The held-out error includes the penalty for its coefficients already, but not if
-                # other parts of the same few recordings are held out, which repeat their paths.
-                score = float(gain.sum()) - price * min(count, self.settings.nameless_price)
-                score -= sum(2 * float(np.log(c.n_chosen)) for c in candidates)
-            ranking.append(Hypothesis(kind, tuple(candidates), gain, score, count, errors=after))
-        return [h for h in ranking if h.score > self.settings.least_gain]
+        _ = self.errors_now(), self.tester(self.chosen)  # before processes that would all find them
+        text = f"{self._round}: refining the best"
+        found = each(lambda own: self._final(own, True), rough[:refined], text)
+        found += [self._final(own, False) for own in rough[refined:]]
+        return [h for h in found if h is not None and h.score > self.settings.least_gain]
+
+    def _final(self, candidates: list[Candidate], refined: bool) -> Hypothesis | None:
+        """An explanation with its score; None if it is physically impossible."""
+        kind = candidates[0].kind
+        candidates = [replace(c, rows=self.problem.term_rows(c.term)) for c in candidates]
+        within = any(map(self.is_judged_within, candidates))
+        hypothesis = Hypothesis(kind, tuple(candidates), np.zeros(0), 0.0, 0)
+        if refined and any(c.n_shapes for c in candidates):
+            candidates, after = self._refined(candidates, within)
+            hypothesis = replace(hypothesis, candidates=tuple(candidates))
+            beside = [[o for o in candidates if o is not c] for c in candidates]
+            if not all(
+                self.can_be(c, [*self.chosen, *rest])
+                for c, rest in zip(candidates, beside, strict=True)
+            ):
+                return None
+        else:
+            after = self._errors(hypothesis, within)
+        gain = log_likelihood_gain(self.errors_now(within), after, self.problem.rows.counts)
+        count = self._n_parameters(candidates)
+        price = 2 * self._price(candidates)
+        score = float(gain.sum()) - price * count
+        if hypothesis.is_further_form:
+            score -= self.settings.least_gain
+        if kind == UNKNOWN and not in_part(hypothesis):
+            # The held-out error includes the penalty for its coefficients already, but not if
+            # other parts of the same few recordings are held out, which repeat their paths.
+            score = float(gain.sum()) - price * min(count, self.settings.nameless_price)
+            score -= sum(2 * float(np.log(c.n_chosen)) for c in candidates)
+        return Hypothesis(kind, tuple(candidates), gain, score, count, errors=after)
 
     def _refined(self, candidates: list[Candidate], within: bool) -> tuple[list[Candidate], Array]:
         """Candidates with their shapes refined, and the held-out errors with them.

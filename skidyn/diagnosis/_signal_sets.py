@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn.diagnosis._signal_products import predictable, simple_functions
+from skidyn.diagnosis._signal_products import LEAST_SHARE, predictable, simple_functions
 from skidyn.effects import Factor
 
 #: Most rows that are used.
@@ -138,8 +138,27 @@ def _ranked(
     left: list[Array] = []
     for start in range(0, len(sets), AT_ONCE):
         some = [[hats[name] for name in names] for names in sets[start : start + AT_ONCE]]
-        left.extend(errors_of_folds(np.stack([*map(_products, some)]), y, parts, RIDGE))
+        left.extend(_errors(np.stack([*map(_products, some)]), y, parts))
     return sorted(zip(sets, left, strict=True), key=lambda item: float(item[1].sum()))
+
+
+def _errors(blocks: Array, y: Array, parts: Sequence[NDArray[np.int64]]) -> Array:
+    """As :func:`errors_of_folds`, of those blocks exactly that may predict anything.
+
+    A fit predicts held-out rows worse than it fits them when they are included, for noise by twice
+    the number of columns. That is assumed for blocks that would have to lose less than half of it.
+    """
+    _, n, k = blocks.shape
+    energy = np.array([y[rows] @ y[rows] for rows in parts])
+    gram, right = blocks.transpose(0, 2, 1) @ blocks, y @ blocks
+    weights = solved(gram + RIDGE * n * np.eye(k), right)
+    fitted = np.sum(weights * (2 * right - (gram @ weights[..., None])[..., 0]), axis=1)
+    share = fitted / max(float(energy.sum()), np.finfo(float).tiny)
+    left: Array = (1 - share + 2 * k / n)[:, None] * energy
+    able = share - k / n > LEAST_SHARE
+    if able.any():
+        left[able] = errors_of_folds(blocks[able], y, parts, RIDGE)
+    return left
 
 
 def errors_of_folds(

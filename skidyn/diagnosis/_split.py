@@ -7,7 +7,7 @@ its load. They are judged on interleaved quarters of every trajectory instead.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -45,6 +45,29 @@ class Split:
     apart: bool = False
 
 
+def _terms(problem: Problem, kind: str) -> tuple[list[Term], list[Term]]:
+    """Effects of a kind in all recordings, at their usual places and elsewhere."""
+    effect, joints, few = get_effect(kind), tuple(range(problem.n_joints)), problem.few
+    if effect.search != "trajectories" or problem.robot is None:
+        return [], []
+    usual = [Term.at(kind, joints, shape) for shape in effect.grid(few, joints)]
+    return usual, [Term.at(kind, joints, shape) for shape in effect.elsewhere(few)]
+
+
+def prepare_splits(problem: Problem, kinds: Iterable[str]) -> None:
+    """Compute the columns that :func:`split_effects` needs, on all cores that may be used.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows; keeps the columns.
+    kinds : iterable of str
+        Kinds to try.
+    """
+    if len(problem.rows.recordings) > 1:
+        problem.prepare([t for kind in kinds for some in _terms(problem, kind) for t in some])
+
+
 def split_effects(
     problem: Problem,
     kinds: Sequence[str],
@@ -77,27 +100,22 @@ def split_effects(
     if problem.robot is None or len(names) < 2:
         return []
     y = [t / s for t, s in zip(target, sigma, strict=True)]
-    joints = tuple(range(problem.n_joints))
     model = _Model.of(problem, blocks, sigma, y)
     found = []
     for kind in kinds:
-        effect = get_effect(kind)
-        if effect.search != "trajectories":
-            continue
+        usual, others = _terms(problem, kind)
         free = ~recordings_with(kind, known, names)
-        if free.sum() < 2:
+        if not usual or free.sum() < 2:
             continue
-        usual = effect.grid(problem.few, joints)
         most, of_kind = 0.0, list[tuple[Split, _Products]]()
-        for shape in [*usual, *effect.elsewhere(problem.few)]:
-            term = Term.at(kind, joints, shape)
+        for term in [*usual, *others]:
             rows = {j: b / sigma[j] for j, b in problem.term_rows(term).items()}
             products = model.with_effect(rows)
             splits = _best_splits(problem, term, products, names, free)
-            if shape in usual:
+            if term in usual:
                 most = max([most, *(float(split.drop.sum()) for split in splits)])
             else:
-                least = effect.elsewhere_must_gain * most
+                least = term.effect.elsewhere_must_gain * most
                 splits = [split for split in splits if float(split.drop.sum()) > least]
             of_kind += [(split, products) for split in splits]
         found += _best_exchanged(problem, of_kind, names, free)

@@ -157,10 +157,9 @@ class Payload(_ToolEffect):
                 f"payload: link={link!r}; expected a whole number from 0 to {bodies - 1}, that of "
                 "the joint that moves the link, counted from 0"
             )
-        first = 10 * int(link)
-        # Chunk by chunk: the whole regressor of a long log does not fit into memory.
-        for rows, chunk in robot.iter_torque_regressor(signals.q, signals.dq, signals.ddq):
-            columns[:, rows] = chunk[:, first : first + 10].transpose(0, 2, 1)
+        motion = signals.q, signals.dq, signals.ddq
+        for rows, chunk in robot.iter_torque_regressor(*motion, body=int(link)):
+            columns[:, rows] = chunk.transpose(0, 2, 1)
         return {j: columns[j] for j in joints}
 
     def elsewhere(self, signals: Signals) -> list[dict[str, Any]]:

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 #: Samples per window that are enough for a smooth function; at first, others are omitted.
 ENOUGH_SAMPLES = 16
+#: Number of terms of many joints that one process computes at a time.
+TOGETHER = 8
 
 
 @dataclass
@@ -172,7 +174,7 @@ class Problem:
         new = [t for t in dict.fromkeys(terms) if t not in self._cache]
         if any({"model_torque", "motor_torque"} & set(t.effect.needs) for t in new):
             _ = self.few.model_torque  # before processes start, which would all compute it
-        groups = [list(g) for _, g in groupby(new, key=lambda t: (t.effect.needs, t.places))]
+        groups = _pieces(new)
         found = each(lambda group: [of(term) for term in group], groups, text)
         rows = dict(zip(chain(*groups), chain(*found), strict=True))
         whole = (t for t in rows if not screening or self._skipped(t) <= self._step(t))
@@ -401,6 +403,14 @@ def hysteresis_joints(terms: Iterable[Term]) -> list[int]:
     """Joints, from 0, whose friction at reversals some of the terms describe."""
     joints = {j for t in terms if t.effect.family == "hysteresis" for j in t.places}
     return sorted(joints)
+
+
+def _pieces(terms: Sequence[Term]) -> list[list[Term]]:
+    """Neighbours that share inputs; those of many joints take longest: first, and in parts."""
+    groups = [list(g) for _, g in groupby(terms, key=lambda t: (t.effect.needs, t.places))]
+    long = [group for group in groups if len(group[0].places) > 2]
+    parts = [group[k : k + TOGETHER] for group in long for k in range(0, len(group), TOGETHER)]
+    return [*parts, *(group for group in groups if len(group[0].places) <= 2)]
 
 
 def width(block: dict[int, Array]) -> int:

@@ -255,7 +255,14 @@ class RigidBodyDynamics:
         return self._engine.torque_regressor(signals, dtype=dtype, out=out, backend=backend)
 
     def iter_torque_regressor(
-        self, q: Any, dq: Any, ddq: Any, chunk: int | None = None, *, backend: str = "numpy"
+        self,
+        q: Any,
+        dq: Any,
+        ddq: Any,
+        chunk: int | None = None,
+        *,
+        backend: str = "numpy",
+        body: int | None = None,
     ) -> Iterator[tuple[slice, np.ndarray]]:
         """Yield the regressor chunk by chunk, without storing all of it.
 
@@ -267,13 +274,23 @@ class RigidBodyDynamics:
             Largest number of samples at a time. None: 3072, or 512 with ``backend="compiled"``.
         backend : {"numpy", "compiled"}, default="numpy"
             ``"compiled"`` works as in :meth:`inverse_dynamics`; a few seconds to compile.
+        body : int, optional
+            Position in ``body_names`` of the only body whose ten columns are computed, which takes
+            a small part of the time; all bodies by default. Not with ``backend="compiled"``.
 
         Yields
         ------
         rows : slice
             The samples.
         Y : ndarray of shape (n_joints, 10 * n_bodies, rows)
-            Their regressor, samples last. The memory is used again for the next chunk.
+            Their regressor, samples last, or the ten columns of ``body``. The memory is used again
+            for the next chunk.
+
+        Raises
+        ------
+        SkidynError
+            If ``chunk`` is below 1, ``body`` is not one of the bodies, or ``backend`` does not
+            compute the columns of one.
         """
         if chunk is None:
             chunk = 512 if backend == "compiled" else 3072
@@ -281,6 +298,15 @@ class RigidBodyDynamics:
             raise SkidynError(f"chunk is {chunk}; expected at least 1.")
         signals = self._signals(q=q, dq=dq, ddq=ddq)
         _check_backend(backend, np.float64)
+        if body is not None:
+            if body not in range(self.n_bodies) or backend == "compiled":
+                raise SkidynError(
+                    f"body is {body} with backend={backend!r}; expected one from 0 to "
+                    f'{self.n_bodies - 1} and "numpy".'
+                )
+            columns = tuple(range(10 * body, 10 * body + 10))
+            yield from self._engine.iter_regressor_columns(signals, columns, 0, chunk)
+            return
         run = self._engine.iter_compiled if backend == "compiled" else self._engine.iter_chunks
         yield from run(signals, chunk, "torque_regressor", self._engine.gravity_key())
 
