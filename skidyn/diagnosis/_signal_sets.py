@@ -61,12 +61,10 @@ def sets_of_signals(
     list of tuple of str
         Up to three sets, fewest signals first; empty if none predicts the residual.
     """
-    step = max(1, -(-len(y) // MOST_ROWS))
-    moving = {name: x[::step] for name, x in signals.items() if np.ptp(x[::step]) > 0}
+    signals, y, parts = _thinned(signals, y, fold)
+    moving = {name: x for name, x in signals.items() if np.ptp(x) > 0}
     if not moving:
         return []
-    y, fold = y[::step] - y[::step].mean(), fold[::step]
-    parts = [np.flatnonzero(fold == f) for f in np.unique(fold)]
     singles = _ranked([(name,) for name in moving], moving, y, parts)
     first = singles[0][0][0]
     close = [name for name in moving if name in near]
@@ -109,10 +107,7 @@ def product_with_function(
         The simple function, the other signals, and the number of products that were tried; None if
         no product predicts the residual.
     """
-    step = max(1, -(-len(y) // MOST_ROWS))
-    own = {name: signals[name][::step] for name in names}
-    y, fold = y[::step] - y[::step].mean(), fold[::step]
-    parts = [np.flatnonzero(fold == f) for f in np.unique(fold)]
+    own, y, parts = _thinned({name: signals[name] for name in names}, y, fold)
     hats = {name: _hats(x, KNOTS[len(names) - 1]) for name, x in own.items()}
     tried, blocks = [], []
     for name, x in own.items():
@@ -126,6 +121,16 @@ def product_with_function(
     best = int(np.argmin(left.sum(1)))
     energy = np.array([y[rows] @ y[rows] for rows in parts])
     return (*tried[best], len(tried)) if predictable(energy, left[best]) else None
+
+
+def _thinned(
+    signals: dict[str, Array], y: Array, fold: NDArray[np.int64]
+) -> tuple[dict[str, Array], Array, list[NDArray[np.int64]]]:
+    """Signals and centred residual at no more rows than are used, and the rows of every fold."""
+    step = max(1, -(-len(y) // MOST_ROWS))
+    y, fold = y[::step] - y[::step].mean(), fold[::step]
+    parts = [np.flatnonzero(fold == f) for f in np.unique(fold)]
+    return {name: x[::step] for name, x in signals.items()}, y, parts
 
 
 def _ranked(

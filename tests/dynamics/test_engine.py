@@ -35,6 +35,16 @@ def test_regressor_chunks_equal_the_whole(n_samples):
     assert covered == n_samples
 
 
+def test_the_columns_of_one_body_are_those_of_the_whole_regressor():
+    robot = load_panda()
+    motion = states(robot, 100)
+    Y = robot.torque_regressor(*motion)
+    for body in (0, 3, robot.n_bodies - 1):
+        (part,) = (part.copy() for _, part in robot.iter_torque_regressor(*motion, body=body))
+        own = Y[:, :, 10 * body : 10 * body + 10]
+        np.testing.assert_allclose(np.moveaxis(part, -1, 0), own, atol=1e-12)
+
+
 def test_two_iterations_at_once_do_not_disturb_each_other():
     robot = load_scara()
     one, other = states(robot, 300, seed=1), states(robot, 300, seed=2)

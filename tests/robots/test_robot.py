@@ -69,6 +69,7 @@ def test_representations():
         (lambda r, q: r.jacobian(q, 2), "body is 2"),
         (lambda r, q: r.forward_kinematics(q, "hand"), "no link 'hand'"),
         (lambda r, q: list(r.iter_torque_regressor(q, q, q, chunk=0)), "chunk is 0"),
+        (lambda r, q: list(r.iter_torque_regressor(q, q, q, body=99)), "body is 99"),
     ],
 )
 def test_wrong_arguments_are_named(call, message):
