@@ -20,12 +20,14 @@ from skidyn.evidence._fit import Fit, FittedAlone, fit_weighted
 from skidyn.evidence._folds import nearest_folds
 from skidyn.evidence._motion_rows import RowsAndFolds, read_motion, rows_and_folds
 from skidyn.evidence._rigid_rows import independent_columns, regressor_rows
-from skidyn.evidence._rows import FEWEST_SAMPLES, WINDOW, Rows, averaged, interpolation
+from skidyn.evidence._rows import WINDOW, Rows, averaged, interpolation
 from skidyn.robots import Robot, base_parameter_index
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
+#: Samples per window that are enough for a smooth function; at first, others are omitted.
+ENOUGH_SAMPLES = 16
 #: Number of terms of many joints that one process computes at a time.
 TOGETHER = 8
 
@@ -104,8 +106,8 @@ class Problem:
     def screening_rows(self, term: Term) -> dict[int, Array]:
         """As :meth:`term_rows`, but of an unknown function from only as many samples as needed.
 
-        A function as smooth as these has the same mean over as few samples of a window as a slow
-        log has; one that jumps or oscillates does not.
+        A window of a log at 1 kHz holds 125 samples. A function as smooth as these has the same
+        mean over every seventh sample; one that jumps or oscillates does not.
         """
         step = self._skipped(term)
         if step <= self._step(term) or term in self._cache:
@@ -125,7 +127,7 @@ class Problem:
         """Step between samples that is small enough for a term at first."""
         if self.signals.time is None or not term.effect.nameless:
             return 1
-        return int(self.signals.rate * WINDOW / FEWEST_SAMPLES)
+        return int(self.signals.rate * WINDOW / ENOUGH_SAMPLES)
 
     def _averaged(self, term: Term, step: int) -> dict[int, Array]:
         signals, weights = self.sampled(step)
