@@ -34,6 +34,9 @@ from skidyn.robots import Robot, base_parameter_index
 
 #: Least number of trajectories in the sample, for cross-validation, and in the rest.
 FEWEST_TRAJECTORIES = 4
+#: Rows of the sample times joints: the columns of all candidates take memory for each of both. A
+#: search in so many takes 1 to 2 GB (``benchmarks/scale/out_of_core.py``).
+SAMPLE = 200_000
 #: Number of groups into which the rest is divided; each is predicted from all others.
 GROUPS = 20
 #: Largest p-value with which a finding is confirmed.
@@ -115,7 +118,7 @@ def diagnose_parquet(
     paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
     *,
     columns: ColumnMap | None = None,
-    sample_rows: int = 100_000,
+    sample_rows: int | None = None,
     effects: Iterable[str] | None = None,
     settings: Settings | None = None,
     max_rows: int = 2_000_000,
@@ -138,9 +141,9 @@ def diagnose_parquet(
         Files or a folder, see :func:`skidyn.evidence.evidence_from_parquet`. They need ``time``.
     columns : mapping, optional
         Column of each signal, for columns without the usual names.
-    sample_rows : int, default=100_000
+    sample_rows : int, optional
         Number of rows used in the search, rounded to whole trajectories: at least four, and at most
-        half of all.
+        half of all. By default 200,000 divided by the number of joints.
     effects : iterable of str, optional
         Kinds to try; by default the whole catalogue.
     settings : Settings, optional
@@ -150,7 +153,8 @@ def diagnose_parquet(
     random_state : int, default=0
         Seed of the sample.
     n_jobs : int, optional
-        Processes that compute the evidence, see :func:`skidyn.evidence.evidence_from_parquet`.
+        Processes that search the sample and compute the evidence, see :func:`diagnose` and
+        :func:`skidyn.evidence.evidence_from_parquet`.
     client : distributed.Client, optional
         Cluster on which to compute it.
 
@@ -197,6 +201,7 @@ def diagnose_parquet(
             f"the columns of {refused[0]!r} require a fit of the model first, so one pass is not "
             "enough; leave it out, or diagnose data in memory"
         )
+    sample_rows = SAMPLE // robot.n_joints if sample_rows is None else sample_rows
     files = parquet_files(paths)
     lengths = [trajectory_lengths(file, robot, columns) for file in files]
     sources = list(zip(files, _draw(lengths, sample_rows, random_state), strict=True))
@@ -204,7 +209,7 @@ def diagnose_parquet(
         int(n[list(drawn)].sum()) for n, (_, drawn) in zip(lengths, sources, strict=True)
     )
     X, tau = _sample(sources, n_sampled, robot, columns, max_rows)
-    diagnosis = diagnose(model, X, tau, effects=effects, settings=settings)
+    diagnosis = diagnose(model, X, tau, effects=effects, settings=settings, n_jobs=n_jobs)
     own = own_terms(model, robot, X, tau)
     tried = [f for f in diagnosis.findings if not any(t.effect.needs_fit for t in f.terms)]
     terms = [*own, *(t for f in tried for t in f.terms)]
