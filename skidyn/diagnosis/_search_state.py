@@ -26,7 +26,7 @@ from skidyn.diagnosis._remainder import position_noise
 from skidyn.diagnosis._rule import CONFINED, Settings, false_discovery_rate
 from skidyn.diagnosis._tester import Tester
 from skidyn.effects import Term
-from skidyn.evidence import Problem
+from skidyn.evidence import Problem, with_short_windows
 
 
 class Kept(NamedTuple):
@@ -47,16 +47,24 @@ class SearchState:
     """The present model, and its residual."""
 
     def __init__(
-        self, problem: Problem, kinds: Sequence[str], settings: Settings, nameless: bool
+        self,
+        problem: Problem,
+        kinds: Sequence[str],
+        settings: Settings,
+        nameless: bool,
+        window: float | None = None,
     ) -> None:
         self.problem = problem
         self.settings = settings
         self.kinds = list(kinds)
         self.vibration = nameless
+        #: Width of windows that are shorter than usual, s.
+        self.window = window
         #: Whether noise of positions is considered: if derivatives come from them, and not for rows
-        #: of other windows.
+        #: that reach up to reversals.
         logged, smooth = problem.logged, problem.signals
-        self.weighs_positions = nameless and logged is not None and smooth.q is not logged.q
+        usual = nameless or window is not None
+        self.weighs_positions = usual and logged is not None and smooth.q is not logged.q
         self.ripple = np.zeros_like(problem.torque)
         self.chosen: list[Candidate] = []
         self.findings: list[Hypothesis] = []
@@ -240,6 +248,9 @@ class SearchState:
         def make() -> Tester:
             terms = self.problem.terms + (c.term for c in self.chosen)
             imitated = imitate(self.problem, replace(self.fit, terms=terms))
+            if self.window is not None:
+                imitated = with_short_windows(imitated, imitated.terms, self.window)
+                imitated.fit_own()
             blocks = [imitated.term_rows(term) for term in imitated.terms]
             return Tester(imitated, blocks, self.sigma, imitated.target)
 
