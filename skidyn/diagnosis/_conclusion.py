@@ -22,6 +22,7 @@ from skidyn.diagnosis._episodes import (
     acting,
     away_from_reversals,
     find_episodes,
+    not_of_positions,
 )
 from skidyn.diagnosis._findings import (
     Finding,
@@ -176,6 +177,10 @@ def conclude(
     taken.update(j for t in inexact for j in problem.term_rows(t))
     share_held = np.array([np.inf if j in taken else EPISODE_LEAST_HELD for j in range(len(rmse))])
     episodes, inside = find_episodes(problem, smooth, least, share_held)
+    if episodes:
+        real = not_of_positions(problem, result.fit, smooth, inside)
+        share_held = np.where(real, share_held, np.inf)
+        episodes, inside = find_episodes(problem, smooth, least, share_held)
     if episodes:
         findings.append(_episodic(episodes, inside, result.fit.residual))
         taken.update(j - 1 for e in episodes for j in e.joints)

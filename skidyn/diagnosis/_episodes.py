@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_closing
 
 from skidyn._signals import Array
+from skidyn.diagnosis._imitation import coarse_joints, imitate
 from skidyn.diagnosis._noise import MEDIAN
 from skidyn.diagnosis._rule import (
     EPISODE_EXCESS,
@@ -27,9 +28,10 @@ from skidyn.diagnosis._rule import (
     EPISODE_MOST_ROWS,
     EPISODE_QUIET,
     EPISODE_SLIDING,
+    IMITATED,
 )
 from skidyn.effects import Term
-from skidyn.evidence import Problem
+from skidyn.evidence import Fit, Problem
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,36 @@ def find_episodes(
         numbers = tuple(j + 1 for j in joints)
         episodes.append(Episode(trajectory, start, end, numbers, size, link, force))
     return episodes, inside
+
+
+def not_of_positions(
+    problem: Problem, fit: Fit, residual: Sequence[Array], inside: Sequence[NDArray[np.bool_]]
+) -> NDArray[np.bool_]:
+    """Whether the episodes of each joint are not what noise of its positions causes, (n_joints,).
+
+    Coarse positions make bursts in the acceleration of a slow motion. With an imitation of the
+    noise, as many rows with the largest residuals may hold only a part of what the episodes do.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and logged positions.
+    fit : Fit
+        The completed model, of whose residual the episodes are.
+    residual, inside : sequence of ndarray
+        As :func:`find_episodes` takes and returns them.
+    """
+    real = np.ones(problem.n_joints, dtype=bool)
+    held = {j for j, rows in enumerate(inside) if rows.any()}
+    held &= coarse_joints(problem, fit, problem.torque - problem.explained(fit)) if held else set()
+    if not held:
+        return real
+    imitated = imitate(problem, fit)
+    noise = imitated.fit(imitated.terms).residual
+    for j in held:
+        largest = np.sort(noise[j] ** 2)[-int(inside[j].sum()) :]
+        real[j] = np.sum(largest) <= IMITATED * np.sum(residual[j][inside[j]] ** 2)
+    return real
 
 
 def acting(

@@ -19,9 +19,34 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from skidyn.diagnosis._noise import as_measured
+import numpy as np
+
+from skidyn._signals import Array
+from skidyn.diagnosis._noise import as_measured, sensor_noise
+from skidyn.diagnosis._remainder import position_noise
 from skidyn.diagnosis._rule import SLOW_MOTION
 from skidyn.evidence import Fit, Problem, make_problem, smooth_motion
+
+
+def coarse_joints(problem: Problem, fit: Fit, residual: Array) -> set[int]:
+    """Joints, from 0, most of whose noise is that of positions.
+
+    Parameters
+    ----------
+    problem : Problem
+        Motion and logged positions.
+    fit : Fit
+        A model.
+    residual : ndarray of shape (n_samples, n_joints)
+        Its residual, N m or N.
+    """
+    logged = problem.logged
+    if logged is None or problem.signals.q is logged.q:
+        return set()  # derivatives do not come from positions
+    if problem.robot is None or problem.of_residual:
+        return set()
+    sensor = np.nan_to_num(sensor_noise(problem.signals, residual, problem.measured))
+    return set(np.flatnonzero(2 * position_noise(problem, fit) ** 2 > sensor**2).tolist())
 
 
 def imitate(problem: Problem, fit: Fit) -> Problem:
@@ -37,7 +62,7 @@ def imitate(problem: Problem, fit: Fit) -> Problem:
     Returns
     -------
     Problem
-        The same terms on imitated positions, with the torque of the model.
+        The same terms on imitated positions, with the torque of the model, and the same windows.
     """
     logged, robot = problem.logged, problem.robot
     assert logged is not None
@@ -56,4 +81,7 @@ def imitate(problem: Problem, fit: Fit) -> Problem:
         terms=fit.terms,
     )
     imitated.fit_own()
+    if problem.with_like_rows is not None:
+        imitated = problem.with_like_rows(imitated, imitated.terms)
+        imitated.fit_own()
     return imitated

@@ -25,7 +25,6 @@ def search(
     among: Callable[[Candidate], bool] | None = None,
     earlier: Sequence[Hypothesis] = (),
     given: Iterable[Term] = (),
-    window: float | None = None,
 ) -> SearchResult:
     """Fit the model, and find the missing effects.
 
@@ -48,11 +47,8 @@ def search(
         removed may be an error of their formulas.
     given : iterable of Term, optional
         Effects of the user's model, for which the same holds if their formulas are not exact.
-    window : float, optional, s
-        Width of the problem's windows, if they are short: what noise of the positions causes in
-        them is imitated, as in usual ones.
     """
-    searcher = _Search(problem, kinds, settings, nameless, window)
+    searcher = _Search(problem, kinds, settings, nameless)
     searcher.vibration &= vibration
     if among is not None:
         searcher.pool = list(filter(among, searcher.pool))

@@ -16,17 +16,15 @@ from skidyn.diagnosis._blocks import variance_inflation
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
 from skidyn.diagnosis._held_out import shares_of_folds
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, terms_on_rows, uses_the_fit
-from skidyn.diagnosis._imitation import imitate
+from skidyn.diagnosis._imitation import coarse_joints, imitate
 from skidyn.diagnosis._looked_at import SAME, LookedAt
 from skidyn.diagnosis._nameless_candidates import nameless_candidates
-from skidyn.diagnosis._noise import sensor_noise
 from skidyn.diagnosis._profile import profile_error
 from skidyn.diagnosis._recordings import recording_candidates
-from skidyn.diagnosis._remainder import position_noise
 from skidyn.diagnosis._rule import CONFINED, Settings, false_discovery_rate
 from skidyn.diagnosis._tester import Tester
 from skidyn.effects import Term
-from skidyn.evidence import Problem, with_short_windows
+from skidyn.evidence import Problem
 
 
 class Kept(NamedTuple):
@@ -52,19 +50,11 @@ class SearchState:
         kinds: Sequence[str],
         settings: Settings,
         nameless: bool,
-        window: float | None = None,
     ) -> None:
         self.problem = problem
         self.settings = settings
         self.kinds = list(kinds)
         self.vibration = nameless
-        #: Width of windows that are shorter than usual, s.
-        self.window = window
-        #: Whether noise of positions is considered: if derivatives come from them, and not for rows
-        #: that reach up to reversals.
-        logged, smooth = problem.logged, problem.signals
-        usual = nameless or window is not None
-        self.weighs_positions = usual and logged is not None and smooth.q is not logged.q
         self.ripple = np.zeros_like(problem.torque)
         self.chosen: list[Candidate] = []
         self.findings: list[Hypothesis] = []
@@ -235,12 +225,7 @@ class SearchState:
 
     def coarse(self) -> set[int]:
         """Joints, from 0, most of whose noise is that of positions."""
-        problem = self.problem
-        if not self.weighs_positions or problem.robot is None or problem.of_residual:
-            return set()
-        residual = self.residual
-        sensor = np.nan_to_num(sensor_noise(problem.signals, residual, problem.measured))
-        return set(np.flatnonzero(2 * position_noise(problem, self.fit) ** 2 > sensor**2).tolist())
+        return coarse_joints(self.problem, self.fit, self.residual)
 
     def imitation(self) -> Tester:
         """Tests on the log as it would be if the present model lacked nothing."""
@@ -248,9 +233,6 @@ class SearchState:
         def make() -> Tester:
             terms = self.problem.terms + (c.term for c in self.chosen)
             imitated = imitate(self.problem, replace(self.fit, terms=terms))
-            if self.window is not None:
-                imitated = with_short_windows(imitated, imitated.terms, self.window)
-                imitated.fit_own()
             blocks = [imitated.term_rows(term) for term in imitated.terms]
             return Tester(imitated, blocks, self.sigma, imitated.target)
 

@@ -93,7 +93,6 @@ def look_at_swift(
             among=among,
             earlier=slow,
             given=given,
-            window=SHORT_WINDOW,
         )
         now = {j: h.kind for h in moved.findings for j in h.joints}
         fastest = [

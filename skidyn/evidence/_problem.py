@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import chain, groupby
 from typing import TYPE_CHECKING, Any
 
@@ -66,6 +67,9 @@ class Problem:
         Whether the torque is the residual of a regressor, and not that of the robot.
     last : LastResults
         Results that are asked for again; shared by copies.
+    with_like_rows : callable or None
+        Function that returns another problem, with given terms, with rows of the kind that this one
+        has, if they are not the usual ones.
     """
 
     robot: Robot | None
@@ -84,6 +88,7 @@ class Problem:
     of_residual: bool = False
     _cache: dict[Term, dict[int, Array]] = field(default_factory=dict, repr=False)
     last: LastResults = field(default_factory=LastResults, repr=False)
+    with_like_rows: Callable[[Problem, Iterable[Term]], Problem] | None = None
     _thinned: dict[int, list[csr_matrix]] = field(default_factory=dict, repr=False)
 
     @property
@@ -492,7 +497,8 @@ def with_reversals(problem: Problem, terms: Iterable[Term], joints: Sequence[int
     joints : sequence of int
         Joints, from 0, whose rows reach up to the reversals.
     """
-    return _with_rows(problem, terms, rows_and_folds(problem.signals, joints))
+    alike = partial(with_reversals, joints=joints)
+    return _with_rows(problem, terms, rows_and_folds(problem.signals, joints), alike)
 
 
 def with_short_windows(problem: Problem, terms: Iterable[Term], window: float) -> Problem:
@@ -507,10 +513,16 @@ def with_short_windows(problem: Problem, terms: Iterable[Term], window: float) -
     window : float, s
         Width of the windows.
     """
-    return _with_rows(problem, terms, rows_and_folds(problem.signals, (), window=window))
+    alike = partial(with_short_windows, window=window)
+    return _with_rows(problem, terms, rows_and_folds(problem.signals, (), window=window), alike)
 
 
-def _with_rows(problem: Problem, terms: Iterable[Term], made: RowsAndFolds) -> Problem:
+def _with_rows(
+    problem: Problem,
+    terms: Iterable[Term],
+    made: RowsAndFolds,
+    alike: Callable[[Problem, Iterable[Term]], Problem],
+) -> Problem:
     rows, fold, n_folds, whole = made
     other = replace(
         problem,
@@ -521,6 +533,7 @@ def _with_rows(problem: Problem, terms: Iterable[Term], made: RowsAndFolds) -> P
         whole_trajectories=whole,
         rigid_rows=[np.zeros((n, 0)) for n in rows.counts],
         rigid_index=np.zeros(0, dtype=np.int64),
+        with_like_rows=alike,
         _cache={},
         _thinned={},
     )
