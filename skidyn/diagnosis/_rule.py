@@ -60,7 +60,7 @@ IN_FEW_BLOCKS, LIKE_ELSEWHERE = 0.1, 16.0
 #: Cut-off in Hz of the motion along which noisy positions are imitated (``_imitation.py``), and
 #: share of what an explanation removes that it must not remove there, too
 #: (``nothing_hidden.py --bits 12``).
-SLOW_MOTION, IMITATED = 6.0, 0.3
+SLOW_MOTION, IMITATED = 6.0, 0.2
 #: Waves per turn from which an unknown function of position cannot represent torque ripple.
 RESOLVED = 40.0
 #: Waves over the travel of a joint below which a ripple beside a force over its position is an
