@@ -14,9 +14,9 @@ from skidyn.identification import RBDRegressor
 STEP = 2 * np.pi / 2**12
 
 
-def diagnosis_of(effect, seed, **options):
+def diagnosis_of(effect, seed, rate=100.0, **options):
     log = make_hidden_effect_log(
-        load_planar_arm(), effect, noise="low", rate=100.0, random_state=seed, **options
+        load_planar_arm(), effect, noise="low", rate=rate, random_state=seed, **options
     )
     X = log.X.copy()
     for name in ("q1", "q2"):
@@ -29,6 +29,15 @@ def diagnosis_of(effect, seed, **options):
 def test_rounded_positions_are_no_payload():
     """The rounding of slow recordings looks like a load that others do not have."""
     diagnosis = diagnosis_of(None, 114010)
+
+    assert diagnosis.verdict == "complete"
+    assert not diagnosis.findings
+
+
+@pytest.mark.parametrize(("rate", "seed"), [(500.0, 9), (1000.0, 2)])
+def test_coarse_positions_of_a_fast_log_are_neither_hysteresis_nor_pushes(rate, seed):
+    """They are looked at near reversals and in short windows, and make bursts in slow motion."""
+    diagnosis = diagnosis_of(None, seed, rate=rate, n_trajectories=8, duration=5.0)
 
     assert diagnosis.verdict == "complete"
     assert not diagnosis.findings
