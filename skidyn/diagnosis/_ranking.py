@@ -408,6 +408,8 @@ class RankingSearch(RecordingSearch):
 
     def _finals(self, rough: list[list[Candidate]], refined: int | None = None) -> list[Hypothesis]:
         """Compare the best kinds with re-estimated noise, the first of them with refined shapes."""
+        if not rough:
+            return []
         refined = self.settings.refined if refined is None else refined
         _ = self.errors_now(), self.tester(self.chosen)  # before processes that would all find them
         text = f"{self._round}: refining the best"
