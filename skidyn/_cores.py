@@ -220,11 +220,12 @@ def _answer(function: Callable[[], Result], into: Connection, memory: int) -> No
             outcome = False, error
     arrays: list[pickle.PickleBuffer] = []
     pickled = pickle.dumps(outcome, protocol=5, buffer_callback=arrays.append)
-    sizes: list[int] = []
+    raw = [array.raw() for array in arrays]
+    sizes = [array.nbytes for array in raw]
     with open(memory, "wb", closefd=False) as file:
-        for array in arrays:
-            file.seek(sum(map(_aligned, sizes)))
-            sizes.append(file.write(array.raw()))
+        for array, start in zip(raw, accumulate(map(_aligned, sizes), initial=0), strict=False):
+            file.seek(start)
+            file.write(array)
     into.send((pickled, sizes))
 
 

@@ -179,8 +179,9 @@ def conclude(
     episodes, inside = find_episodes(problem, smooth, least, share_held)
     if episodes:
         real = not_of_positions(problem, result.fit, smooth, inside)
-        share_held = np.where(real, share_held, np.inf)
-        episodes, inside = find_episodes(problem, smooth, least, share_held)
+        if not real.all():
+            share_held = np.where(real, share_held, np.inf)
+            episodes, inside = find_episodes(problem, smooth, least, share_held)
     if episodes:
         findings.append(_episodic(episodes, inside, result.fit.residual))
         taken.update(j - 1 for e in episodes for j in e.joints)

@@ -142,8 +142,8 @@ def not_of_positions(
         As :func:`find_episodes` takes and returns them.
     """
     real = np.ones(problem.n_joints, dtype=bool)
-    held = {j for j, rows in enumerate(inside) if rows.any()}
-    held &= coarse_joints(problem, fit, problem.torque - problem.explained(fit)) if held else set()
+    held = coarse_joints(problem, fit, problem.torque - problem.explained(fit))
+    held &= {j for j, rows in enumerate(inside) if rows.any()}
     if not held:
         return real
     imitated = imitate(problem, fit)

@@ -80,8 +80,7 @@ def imitate(problem: Problem, fit: Fit) -> Problem:
         rigid_body=problem.rigid_body,
         terms=fit.terms,
     )
-    imitated.fit_own()
     if problem.with_like_rows is not None:
         imitated = problem.with_like_rows(imitated, imitated.terms)
-        imitated.fit_own()
+    imitated.fit_own()
     return imitated

@@ -7,7 +7,7 @@ from a residual that is still the same still does.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -88,6 +88,17 @@ class LookedAt:
             Name of the look.
         """
         return self.changed | self._found.get(look, self.changed)
+
+    def may_find(self, look: str) -> Callable[[Candidate], bool]:
+        """Function that returns whether a candidate acts where a further look may find something.
+
+        Parameters
+        ----------
+        look : str
+            Name of the look.
+        """
+        joints = self.joints(look)
+        return lambda candidate: not joints.isdisjoint(candidate.rows)
 
     def keep(self, look: str, joints: Iterable[int]) -> None:
         """Store the joints, from 0, at which a further look found something."""

@@ -56,19 +56,18 @@ def nameless_candidates(
     import scipy.signal  # noqa: F401
 
     looked_at = range(problem.n_joints) if followed_on is None else followed_on
-
-    kinds = [effect for effect in map(get_effect, nameless_kinds()) if effect.search != "spectrum"]
+    effects = [e for e in map(get_effect, nameless_kinds()) if e.search != "spectrum"]
 
     def follow(j: int) -> tuple[Followed, dict[str, list[dict[str, Any]]]]:
         found = followed_signals(problem, j, residual[:, j])
         if followed_on is not None:
             return found, {}
-        return found, {e.kind: _waves(problem, e, j, residual) for e in kinds}
+        return found, {e.kind: _waves(problem, e, j, residual) for e in effects}
 
     found = each(follow, looked_at)
     followed = dict(zip(looked_at, found, strict=True))
     made: list[tuple[Term, tuple[str, ...], int]] = []
-    for effect in kinds:
+    for effect in effects:
         assert isinstance(effect, NamelessEffect)
         for joints in effect.sites(problem.few):
             joint = joints[0]

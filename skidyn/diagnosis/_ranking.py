@@ -336,11 +336,6 @@ class RankingSearch(RecordingSearch):
         carries = tester.test(other.rows).coefficients
         return other if carries[0] > 0 or (fewer and other.allows(carries)) else candidate
 
-    def _may_be_found(self, look: str) -> Callable[[Candidate], bool]:
-        """Whether a candidate acts on a joint at which a look may find something."""
-        joints = self.looked.joints(look)
-        return lambda candidate: not joints.isdisjoint(candidate.rows)
-
     def _parts(self) -> tuple[list[list[Candidate]], set[int]]:
         """Effects of a part of the recordings, those that may be possible, and their joints.
 
@@ -356,7 +351,7 @@ class RankingSearch(RecordingSearch):
         changed = {c.joints for c in self.chosen if c.kind == DRIFT and some_recordings(c)}
         pool += own_effects(self.problem, self.kinds)
         pool = [c for c in pool if c.kind not in FRICTION or c.joints not in changed]
-        pool = list(filter(self._may_be_found("parts"), pool))
+        pool = list(filter(self.looked.may_find("parts"), pool))
         found, joints = part_candidates(pool, tester, self.significant, refined, least)
         return [own for own in found if all(self.can_be(c, self.chosen) for c in own)], joints
 
@@ -366,7 +361,7 @@ class RankingSearch(RecordingSearch):
         # intervals of their own for the same kind again would follow any torque
         already = {c.kind for c in self.chosen if c.term.spans}
         kinds = [kind for kind in self.kinds if kind not in already]
-        among = self._may_be_found("spans")
+        among = self.looked.may_find("spans")
         found = span_candidates(self.problem, kinds, tester, self.significant, least, among)
         found = [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
         return [self._in_time(own) for own in found if not self._follows_one_joint(tester, own)]
@@ -401,7 +396,7 @@ class RankingSearch(RecordingSearch):
         tester, least = self.tester(self.chosen), self.settings.least_gain
         already = {c.kind for c in self.chosen if c.term.course}
         kinds = [kind for kind in self.kinds if kind not in already]
-        possible, among = partial(self.can_be, others=self.chosen), self._may_be_found("courses")
+        possible, among = partial(self.can_be, others=self.chosen), self.looked.may_find("courses")
         return course_candidates(
             self.problem, kinds, tester, possible, self.significant, least, among
         )

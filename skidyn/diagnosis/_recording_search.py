@@ -19,8 +19,7 @@ class RecordingSearch(SearchState):
 
     def by_kind_of_recording(self) -> list[Callable[[], list[list[Candidate]]]]:
         """Changes between recordings for each kind."""
-        joints = self.looked.joints("recordings")
-        open_to = [c for c in self.by_recording if not joints.isdisjoint(c.rows)]
+        open_to = list(filter(self.looked.may_find("recordings"), self.by_recording))
 
         def look(kind: str) -> list[list[Candidate]]:
             pool = [c for c in open_to if c.kind == kind]

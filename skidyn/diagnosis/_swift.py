@@ -85,15 +85,7 @@ def look_at_swift(
         moving = [h for h in result.findings if h.kind in family]
         among = partial(_is_tried, slowed=slowed, known=moving)
         given = problem.terms
-        moved = search(
-            short,
-            family,
-            gates,
-            nameless=False,
-            among=among,
-            earlier=slow,
-            given=given,
-        )
+        moved = search(short, family, gates, nameless=False, among=among, earlier=slow, given=given)
         now = {j: h.kind for h in moved.findings for j in h.joints}
         fastest = [
             c.term.effect.fastest(c.term.shape) for h in moved.findings for c in h.candidates
