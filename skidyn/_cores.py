@@ -18,6 +18,7 @@ import pickle
 import signal
 import struct
 import sys
+import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -29,6 +30,7 @@ from skidyn._progress import listening, tell, track
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
+    from multiprocessing.context import ForkProcess
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -36,8 +38,12 @@ Result = TypeVar("Result")
 _CORES: ContextVar[int] = ContextVar("skidyn_cores", default=1)
 #: Processes of :func:`aside` whose results may not be there yet.
 _ASIDE: ContextVar[tuple[_Child[Any], ...]] = ContextVar("skidyn_aside", default=())
-#: Most processes: starting one takes some 20 ms, which more processes would not save.
+#: Processes that are ended, but whose memory the system may still be freeing.
+_ENDED: ContextVar[list[ForkProcess]] = ContextVar("skidyn_ended")
+#: Most processes: more would not save the time that starting them takes.
 MOST_PROCESSES = 8
+#: Approximate time that starting and ending a process takes, s.
+STARTING = 0.02
 #: Number of task numbers that fit into a pipe; processes read them one after another.
 MOST_PIECES = 4096
 _NUMBER = struct.Struct("=I")
@@ -63,10 +69,14 @@ def cores(n_jobs: int | None) -> Iterator[None]:
     token = _CORES.set(
         min(effective_n_jobs(n_jobs), MOST_PROCESSES) if sys.platform == "linux" else 1
     )
+    ended = _ENDED.set([])
     try:
         yield
     finally:
         _CORES.reset(token)
+        for process in _ENDED.get():
+            process.join()
+        _ENDED.reset(ended)
 
 
 def alone() -> bool:
@@ -74,12 +84,19 @@ def alone() -> bool:
     return _CORES.get() < 2
 
 
-def each(function: Callable[[Item], Result], items: Iterable[Item], text: str = "") -> list[Result]:
+def each(
+    function: Callable[[Item], Result],
+    items: Iterable[Item],
+    text: str = "",
+    *,
+    short: bool = False,
+) -> list[Result]:
     """Results of a function for every item, in their order; its exceptions are raised.
 
     A result is pickled if another process computed it, and side effects there are lost; items need
     not be picklable. ``text`` describes the task for progress reports. A process of :func:`aside`
-    takes one of the cores until it has its result.
+    takes one of the cores until it has its result. With ``short`` items of a few milliseconds or
+    less, processes are started as soon as all items so far have taken as long as starting one.
     """
     items = list(items)
     size = -(-len(items) // MOST_PIECES)
@@ -92,9 +109,12 @@ def each(function: Callable[[Item], Result], items: Iterable[Item], text: str = 
     os.close(filled)  # a process that finds the pipe empty is done
 
     children: list[_Child[dict[int, Result]]] = []
+    earliest = time.perf_counter() + (STARTING if short else 0.0)
 
     def start() -> None:
         """Start a process for every free core; one of :func:`aside` may end meanwhile."""
+        if time.perf_counter() < earliest:
+            return
         free = count - sum(child.busy for child in _ASIDE.get())
         while 1 + len(children) < min(free, len(pieces)) and (child := _started(work)):
             children.append(child)
@@ -201,11 +221,11 @@ class _Child(Generic[Result]):
         return value  # type: ignore[no-any-return]
 
     def end(self) -> None:
-        """End the process if it still runs."""
+        """End the process if it still runs, without waiting until its memory is free."""
         self._pipe.close()
         os.close(self._memory)
         self._process.kill()
-        self._process.join()
+        _ENDED.get().append(self._process)
 
 
 def _answer(function: Callable[[], Result], into: Connection, memory: int) -> None:

@@ -188,41 +188,54 @@ class RankingSearch(RecordingSearch):
         pool = self.pool if nameless else [c for c in self.pool if c.kind != UNKNOWN]
         self.ranked = list(filter(looked.is_open, pool))
         kinds = np.array([c.kind if c.n_chosen == 1 else PRODUCTS for c in self.ranked])
-        within = np.array([self.is_judged_within(c) for c in self.ranked], dtype=bool)
-        self.drops = np.full(len(self.ranked), -np.inf)
+        screen = Screen(self.problem, self.sigma, self.ranked, self.target)
+        base = screen.model(self.blocks)
+        removed = screen.removed(base, np.ones(len(self.ranked), dtype=bool))
+        # What removes too little from the error of all rows removes even less if folds are held
+        # out: for it, the usual difference of twice the number of coefficients is assumed.
+        self.drops = removed - 2.0 * screen.widths
+        near = self._near(screen, removed)
+        within = self._judged_within(near)
         looks: list[Callable[[], _Greedy]] = []
-        for wanted, inside in ((~within, False), (within, True)):
-            if not wanted.any():
+        for some, inside in ((near & ~within, False), (near & within, True)):
+            if not some.any():
                 continue
-            screen = Screen(self.problem, self.sigma, self.ranked, self.target, within=inside)
-            base = screen.model(self.blocks)
-            first, drops = self._stepped(screen, base, wanted)
-            self.drops[wanted] = drops[wanted]
+            if inside:
+                screen = screen.of_parts()
+                base = screen.model(self.blocks)
+            first = screen.step(base, some)
+            self.drops[some] = base.errors.sum() - first[some].sum(1)
             looks += [
-                partial(self._greedy, screen, wanted & (kinds == kind), base, first, tester)
-                for kind in dict.fromkeys(kinds[wanted])
+                partial(
+                    self._greedy, screen, some & (kinds == kind), kinds == kind, base, first, tester
+                )
+                for kind in dict.fromkeys(kinds[some])
             ]
         looked.keep_weak(self.ranked, self.drops, self.settings.least_gain)
         return looks
 
-    def _stepped(self, screen: Screen, model: Model, wanted: Mask) -> tuple[Array, Array]:
-        """Held-out errors of candidates that may remove enough, and what each removes.
+    def _near(self, screen: Screen, removed: Array) -> Mask:
+        """Candidates that may remove enough of the held-out error."""
+        near: Mask = removed - screen.widths > self.settings.least_share * screen.n_rows
+        return near
 
-        What removes too little from the error of all rows removes even less if folds are held out:
-        for it, the usual difference of twice the number of coefficients is assumed.
-        """
-        removed = screen.removed(model, wanted)
-        near = removed - screen.widths > self.settings.least_share * screen.n_rows
-        errors = screen.step(model, near)
-        held_out = model.errors.sum() - errors[near].sum(1)
-        drops = removed - 2.0 * screen.widths
-        drops[near] = held_out
-        return errors, drops
+    def _judged_within(self, wanted: Mask) -> Mask:
+        """Those of some candidates that are held out by parts of recordings."""
+        within = np.zeros(len(wanted), dtype=bool)
+        for i in np.flatnonzero(wanted):
+            within[i] = self.is_judged_within(self.ranked[i])
+        return within
 
     def _greedy(
-        self, screen: Screen, wanted: Mask, base: Model, first: Array, tester: Tester
+        self,
+        screen: Screen,
+        near: Mask,
+        of_kind: Mask,
+        base: Model,
+        first: Array,
+        tester: Tester,
     ) -> _Greedy:
-        pool, errors, model, now = wanted.copy(), first, base, base.errors
+        pool, errors, model, now = near, first, base, base.errors
         index: list[int] = []
         chosen: list[Candidate] = []
         # A further form was chosen from all possible ones, so it must be better by this much.
@@ -244,11 +257,14 @@ class RankingSearch(RecordingSearch):
             index.append(found)
             chosen.append(candidate)
             now = errors[found]
-            pool &= self._still_open(candidate, chosen)
-            if pool.any():
-                model = screen.beside(model, candidate.rows)
-                errors, _ = self._stepped(screen, model, pool)
-                tester = self.tester([*self.chosen, *chosen])
+            of_kind = of_kind & self._still_open(candidate, chosen)
+            if not of_kind.any():
+                break
+            model = screen.beside(model, candidate.rows)
+            pool = self._near(screen, screen.removed(model, of_kind))
+            pool &= self._judged_within(pool) == screen.within
+            errors = screen.step(model, pool)
+            tester = self.tester([*self.chosen, *chosen])
         return index, float(base.errors.sum() - now.sum())
 
     def _first_significant(

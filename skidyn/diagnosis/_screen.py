@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import chain
@@ -68,8 +69,11 @@ class Screen:
         Effects that may be missing.
     target : list of ndarray
         Averaged torque of every joint.
-    within : bool, default=False
-        Leave out interleaved parts of every trajectory instead of whole ones.
+
+    Attributes
+    ----------
+    within : bool
+        Whether interleaved parts of every trajectory are left out instead of whole ones.
     """
 
     def __init__(
@@ -78,21 +82,27 @@ class Screen:
         sigma: Array,
         candidates: Sequence[Candidate],
         target: Sequence[Array],
-        *,
-        within: bool = False,
     ) -> None:
         self.problem = problem
         self.sigma = sigma
         self.target = [y / s for y, s in zip(target, sigma, strict=True)]
+        self.within = False
         self.folds: list[list[Any]]
-        if within:
-            parts = range(QUARTERS)
-            self.folds = [[np.flatnonzero(q == k) for k in parts] for q in problem.rows.quarter]
-        else:
-            self.folds = [list(fold_slices(fold, problem.n_folds)) for fold in problem.fold]
-        self.n_folds = len(self.folds[0])
+        self.folds = [list(fold_slices(fold, problem.n_folds)) for fold in problem.fold]
         self.candidates = list(candidates)
         self._groups = self._group()
+
+    def of_parts(self) -> Screen:
+        """The same that leaves out interleaved parts of every trajectory instead of whole ones."""
+        inside, quarters = copy(self), self.problem.rows.quarter
+        inside.within = True
+        inside.folds = [[np.flatnonzero(q == k) for k in range(QUARTERS)] for q in quarters]
+        return inside
+
+    @property
+    def n_folds(self) -> int:
+        """Number of parts that are left out."""
+        return len(self.folds[0])
 
     @cached_property
     def widths(self) -> NDArray[np.int64]:
@@ -102,8 +112,9 @@ class Screen:
     @cached_property
     def n_rows(self) -> NDArray[np.int64]:
         """Number of rows of the joints of every candidate, (n_candidates,)."""
-        counts = self.problem.rows.counts
-        return np.array([counts[list(c.joints)].sum() for c in self.candidates])
+        sites = [c.joints for c in self.candidates]
+        counts = {joints: self.problem.rows.counts[list(joints)].sum() for joints in set(sites)}
+        return np.array([counts[joints] for joints in sites])
 
     @cached_property
     def further_forms(self) -> Array:
@@ -170,7 +181,7 @@ class Screen:
         impossible coefficients.
         """
         removed = np.full(len(self.candidates), -np.inf)
-        for own in each(partial(self._removed, model), self._in_parts(wanted)):
+        for own in each(partial(self._removed, model), self._in_parts(wanted), short=True):
             for index, drops in own:
                 removed[index] = drops
         return removed
@@ -181,7 +192,7 @@ class Screen:
         It is infinite for candidates that are not ``wanted``.
         """
         errors = np.full((len(self.candidates), self.n_folds), np.inf)
-        found = each(partial(self._errors, model, model.bends), self._in_parts(wanted))
+        found = each(partial(self._errors, model, model.bends), self._in_parts(wanted), short=True)
         for index, own in chain.from_iterable(found):
             errors[index] = own
         return errors

@@ -14,7 +14,7 @@ import numpy as np
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Effect
 from skidyn.effects._parameters import Coefficient
-from skidyn.effects._smooth import ordered_functions, splines, supported_range
+from skidyn.effects._smooth import ordered_functions, range_of, splines
 
 
 def unnamed_coefficients(count: int) -> tuple[Coefficient, ...]:
@@ -87,8 +87,7 @@ class _Spline(NamelessEffect):
     n_splines: ClassVar[int] = 10
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        x = getattr(signals, self.signal)[:, joints[0]]
-        low, high = supported_range(signals, x)
+        low, high = range_of(signals, f"{self.signal}{joints[0] + 1}")
         return [{"low": low, "high": high}] if high > low else []
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
@@ -123,7 +122,7 @@ def _sliding(signals: Signals, joint: int, prefix: str = "") -> dict[str, float]
     """Middle and length in m of the range of a slider; nothing for a joint that turns."""
     if not signals.prismatic[joint]:
         return {}
-    low, high = supported_range(signals, signals.q[:, joint])
+    low, high = range_of(signals, f"q{joint + 1}")
     return {f"{prefix}middle": (low + high) / 2, f"{prefix}span": high - low} if high > low else {}
 
 

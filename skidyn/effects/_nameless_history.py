@@ -14,7 +14,7 @@ from skidyn.effects._hysteresis import cut_strokes, dahl_state, stop_along, stro
 from skidyn.effects._moments import moments
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
 from skidyn.effects._parameters import Shape
-from skidyn.effects._smooth import splines, supported_range
+from skidyn.effects._smooth import range_of, splines
 
 #: Distances since the last reversal, rad or tenths of m, over which a torque may fade.
 _WAYS = (0.01, 0.03, 0.1, 0.3)
@@ -189,7 +189,7 @@ class FunctionOfLastReversal(_OfAnyJoint):
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         found = []
         for shape in super().grid(signals, joints):
-            low, high = supported_range(signals, signals.q[:, shape["other"]])
+            low, high = range_of(signals, f"q{shape['other'] + 1}")
             if high > low:
                 found.append({**shape, "low": low, "high": high})
         return found
@@ -298,7 +298,7 @@ class HysteresisOverLoad(NamelessEffect):
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         if signals.model_torque is None:
             return []
-        low, high = supported_range(signals, signals.model_torque[:, joints[0]])
+        low, high = range_of(signals, f"tau{joints[0] + 1}")
         return [{"range": high - low}] if high > low else []
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
@@ -332,7 +332,7 @@ class FunctionOfLaggingPosition(NamelessEffect):
     plays: ClassVar[tuple[float, ...]] = _PLAYS
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
-        low, high = supported_range(signals, getattr(signals, self.signal)[:, joints[0]])
+        low, high = range_of(signals, f"{self.signal}{joints[0] + 1}")
         return [{"play": share * (high - low), "low": low, "high": high} for share in self.plays]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:

@@ -16,6 +16,7 @@ from skidyn.effects._parameters import Shape
 from skidyn.effects._smooth import (
     HIGHEST_ORDER,
     ordered_functions,
+    range_of,
     splines,
     supported_range,
     supported_ranges,
@@ -86,7 +87,7 @@ def ranges_of(signals: Signals, names: Sequence[str]) -> dict[str, Any]:
     dict
         The names, ``of``, and the ends of their ranges, ``low`` and ``high``, in their units.
     """
-    low, high = zip(*(supported_range(signals, signals.named(name)) for name in names), strict=True)
+    low, high = zip(*(range_of(signals, name) for name in names), strict=True)
     return {"of": tuple(names), "low": low, "high": high}
 
 
@@ -275,8 +276,7 @@ class TorqueBetweenTwoJoints(NamelessEffect):
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         unit = self.travel(signals, joints, {})
-        every = signals.once("ranges of q", lambda: supported_ranges(signals, signals.q))
-        ranges = [every[j] for j in joints]
+        ranges = [range_of(signals, f"q{j + 1}") for j in joints]
         middle = tuple((low + high) / 2 for low, high in ranges)
         half = tuple((high - low) / 2 for low, high in ranges)
         found = []

@@ -73,6 +73,15 @@ def supported_range(signals: Signals, x: Array) -> tuple[float, float]:
     return found
 
 
+def range_of(signals: Signals, name: str) -> tuple[float, float]:
+    """:func:`supported_range` of a signal by its name, joints counted from 1, such as ``"q2"``."""
+    return signals.once(  # type: ignore[no-any-return]
+        ("range", name),
+        lambda: supported_range(signals, signals.named(name)),
+        of_fit=name.startswith("tau"),
+    )
+
+
 def supported_ranges(signals: Signals, x: Array) -> list[tuple[float, float]]:
     """:func:`supported_range` of several signals, shape (n_samples, n_signals)."""
     rows, reaching = signals.once("rows held out", lambda: _rows_held_out(signals))

@@ -111,22 +111,21 @@ def weighted_least_squares(design: list[Array], target: list[Array], sigma: Arra
 
 def fit_weighted(terms: TermSum, design: list[Array], target: list[Array], sigma: Array) -> Fit:
     """Least squares of all joints with rows weighted by the noise of their joint."""
-    a = np.empty((sum(map(len, design)), design[0].shape[1]))
-    ends = np.cumsum([0, *map(len, design)])
-    for block, s, start, stop in zip(design, sigma, ends[:-1], ends[1:], strict=True):
-        np.divide(block, s, out=a[start:stop])
-    y = np.concatenate([t / s for t, s in zip(target, sigma, strict=True)])
-    size = np.linalg.norm(a, axis=0)
+    gram, right, whole = np.zeros((design[0].shape[1],) * 2), np.zeros(design[0].shape[1]), 0.0
+    for block, y, s in zip(design, target, sigma, strict=True):  # not stacked: they may be large
+        gram += block.T @ block / s**2
+        right += block.T @ y / s**2
+        whole += float(y @ y / s**2)
+    size = np.sqrt(np.diag(gram))
     size[size == 0] = 1.0
-    unit = a / size
     # No single column explains more than the whole torque. Undetermined quantities, such as the
     # share of a rotor in an inertia, are set by the smallest corrections, so that the loads of the
     # joints, which depend on them, stay realistic.
-    ridge = max(RIDGE, 1 / max(float(y @ y), 1 / LARGEST_RIDGE))
-    normal = Normal(unit.T @ unit, unit.T @ y, np.ones(len(size)), ridge)
+    normal = Normal(gram, right, size, max(RIDGE, 1 / max(whole, 1 / LARGEST_RIDGE)))
     # One refinement step recovers the accuracy lost by forming the Gram matrix.
-    scaled = normal.solution + normal.solve(unit.T @ (y - a @ (normal.solution / size)))
-    coefficients = scaled / size
+    rough, parts = normal.solution, zip(design, target, sigma, strict=True)
+    left = sum(block.T @ (y - block @ rough) / s**2 for block, y, s in parts)
+    coefficients = rough + normal.solve(np.asarray(left))
     residual = [t - block @ coefficients for block, t in zip(design, target, strict=True)]
     rounding = [EXACT * np.sqrt(np.mean(t**2)) if len(t) else 0.0 for t in target]
     noise = np.asarray(sigma, dtype=float)

@@ -180,7 +180,7 @@ class Problem:
         if any({"model_torque", "motor_torque"} & set(t.effect.needs) for t in new):
             _ = self.few.model_torque  # before processes start, which would all compute it
         groups = _pieces(new)
-        found = each(lambda group: [of(term) for term in group], groups, text)
+        found = each(lambda group: [of(term) for term in group], groups, text, short=True)
         rows = dict(zip(chain(*groups), chain(*found), strict=True))
         whole = (t for t in rows if not screening or self._skipped(t) <= self._step(t))
         self._cache |= {t: rows[t] for t in whole}
