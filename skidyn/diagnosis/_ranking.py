@@ -584,10 +584,11 @@ class RankingSearch(RecordingSearch):
         return all(term.follows_position for term in own)
 
     def _against_functions(self, ripple: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
-        """A ripple, judged on averaged rows if a function of the signals explains much more there.
+        """A ripple, judged on averaged rows beside functions of the signals that explain something.
 
         A wave with few periods per turn fits part of any torque that depends on the position, such
-        as a bump.
+        as a bump, of which a function explains much more. Samples contain all noise that is faster
+        than the rows, so that the same ripple explains less of them.
         """
         rivals = [h for h in ranking if h.kind == UNKNOWN and set(h.joints) & set(ripple.joints)]
         if not rivals or ripple.kind == UNKNOWN:
@@ -595,7 +596,8 @@ class RankingSearch(RecordingSearch):
         blocks = [*self.blocks, *(c.rows for c in ripple.candidates)]
         after = profile_error(self.problem, blocks, self.sigma, self.target)
         gain = log_likelihood_gain(self.errors_now(), after, self.problem.rows.counts)
-        score = float(gain.sum())
-        if score > self.settings.ripple_share * max(h.score for h in rivals):
-            return ripple
-        return replace(ripple, score=min(score, ripple.score))
+        score, best = float(gain.sum()), max(h.score for h in rivals)
+        if score <= self.settings.ripple_share * best:
+            return replace(ripple, score=min(score, ripple.score))
+        score -= 2 * self._price(ripple.candidates) * self._n_parameters(ripple.candidates)
+        return replace(ripple, score=max(score, ripple.score))

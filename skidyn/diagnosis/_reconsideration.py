@@ -297,11 +297,13 @@ class ReconsideringSearch(DuellingSearch):
 
     def _also(self, finding: Hypothesis, kind: str) -> Hypothesis | None:
         """Another kind on the same joints that explains nearly as much as a finding."""
-        least = (1 - self.settings.simpler_share) * finding.score
+        share = 1 - self.settings.simpler_share
+        # a term that was found together with those of other joints was compared alone
         near = [
             h
-            for h in finding.others
-            if h.kind == kind and h.joints == finding.joints and h.score >= least
+            for own in (finding, *(own for own in finding.alone if own.joints == finding.joints))
+            for h in own.others
+            if h.kind == kind and h.joints == finding.joints and h.score >= share * own.score
         ]
         return max(near, key=lambda h: h.score, default=None)
 
