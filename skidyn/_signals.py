@@ -93,6 +93,8 @@ def rates_of(values: Array, time: Array, segments: Iterable[slice]) -> Array:
 
 def _gaps(steps: Array) -> NDArray[np.intp]:
     """Steps back, and steps much longer than most of the same trajectory."""
+    if not len(steps) or 0 < steps.max() <= GAP_STEPS * steps.min():
+        return np.zeros(0, dtype=np.intp)  # their median is no less than the shortest one
     forward = steps[steps > 0]
     longest = GAP_STEPS * np.median(forward) if len(forward) else np.inf
     return np.flatnonzero((steps < 0) | (steps > longest))

@@ -113,9 +113,9 @@ class Evidence:
         design = problem.design([problem.term_rows(t) for t in terms])
         rows = {}
         for j, (block, y) in enumerate(zip(design, problem.target, strict=True)):
-            for name in np.unique(problem.rows.trajectory[j]):
-                here = problem.rows.trajectory[j] == name
-                rows[int(name), j] = np.column_stack([block[here], y[here]])
+            whole, trajectory = np.column_stack([block, y]), problem.rows.trajectory[j]
+            for name in np.unique(trajectory):
+                rows[int(name), j] = whole[trajectory == name]
         return cls.from_rows(names, rows)
 
     @property
@@ -133,11 +133,7 @@ class Evidence:
             raise SkidynError("evidence of different columns cannot be merged")
         factors, counts = dict(self.factors), dict(self.counts)
         for key, factor in other.factors.items():
-            if key in factors:
-                factors[key] = _triangle(np.vstack([factors[key], factor]))
-                counts[key] += other.counts[key]
-            else:
-                factors[key], counts[key] = factor, other.counts[key]
+            _add(factors, counts, key, factor, other.counts[key])
         return Evidence(self.columns, factors, counts)
 
     def scaled(self, weight: float) -> Evidence:
@@ -197,12 +193,12 @@ class Evidence:
         Evidence
             The same columns.
         """
-        result = Evidence(self.columns, {}, {})
+        factors: dict[Key, Array] = {}
+        counts: dict[Key, float] = {}
         for (trajectory, joint), factor in self.factors.items():
             number = trajectory + by if groups is None else (trajectory + by) % groups
-            key, count = (number, joint), self.counts[trajectory, joint]
-            result += Evidence(self.columns, {key: factor}, {key: count})
-        return result
+            _add(factors, counts, (number, joint), factor, self.counts[trajectory, joint])
+        return Evidence(self.columns, factors, counts)
 
     def select(self, columns: Sequence[str]) -> Evidence:
         """Evidence of a model with fewer columns.
@@ -386,14 +382,32 @@ def column_names(
     tuple of str
         Such as ``"m_link1"`` and ``"viscous.Fv[1]"``, joints counted from 1.
     """
-    names = [] if robot is None else [robot.parameter_names[i] for i in rigid_index]
-    return (*names, *TermSum(terms).names)
+    rigid: list[str] = []
+    if robot is not None:
+        names = robot.parameter_names
+        rigid = [names[i] for i in rigid_index]
+    return (*rigid, *TermSum(terms).names)
+
+
+def _add(
+    factors: dict[Key, Array], counts: dict[Key, float], key: Key, factor: Array, count: float
+) -> None:
+    """Add a factor, which is merged with the one that has its key already."""
+    if key in factors:
+        factors[key] = _triangle(np.vstack([factors[key], factor]))
+        counts[key] += count
+    else:
+        factors[key], counts[key] = factor, count
 
 
 def _triangle(rows: Array) -> Array:
-    """Square upper triangular factor, padded with zero rows where there are few rows."""
-    width = rows.shape[1]
-    factor: Array = np.asarray(np.linalg.qr(rows, mode="r"))
-    if len(factor) < width:
-        factor = np.vstack([factor, np.zeros((width - len(factor), width))])
+    """Square upper triangular factor, padded with zero rows where there are few rows.
+
+    A joint has no torque from the links before it and from friction of other joints. Such columns
+    of zeros are left out; the factor of the others is triangular in their places, too.
+    """
+    used = np.flatnonzero(rows.any(axis=0))
+    triangle = np.linalg.qr(rows[:, used], mode="r")
+    factor = np.zeros((rows.shape[1], rows.shape[1]))
+    factor[np.ix_(used[: len(triangle)], used)] = triangle
     return factor

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import chain, groupby
+from itertools import chain, groupby, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -192,12 +192,15 @@ class Problem:
 
     def design(self, blocks: Sequence[dict[int, Array]]) -> list[Array]:
         """Rigid-body columns and blocks of columns side by side, per joint."""
-        design = []
-        for j in range(self.n_joints):
-            n_rows = int(self.rows.counts[j])
-            parts = [self.rigid_rows[j]]
-            parts += [b[j] if j in b else np.zeros((n_rows, width(b))) for b in blocks]
-            design.append(np.hstack(parts))
+        start = self.rigid_rows[0].shape[1]
+        ends = np.cumsum([start, *map(width, blocks)]).tolist()
+        places = [slice(a, b) for a, b in pairwise(ends)]
+        design = [np.zeros((len(rows), ends[-1])) for rows in self.rigid_rows]
+        for j, rows in enumerate(design):
+            rows[:, :start] = self.rigid_rows[j]
+            for own, block in zip(places, blocks, strict=True):
+                if j in block:
+                    rows[:, own] = block[j]
         return design
 
     def soft(self, terms: Sequence[Term]) -> list[tuple[slice, float]]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,11 +13,13 @@ from numpy.typing import NDArray
 from skidyn._progress import tell
 from skidyn._signals import Array
 from skidyn.evidence._rows import RowsInTime
-from skidyn.robots import with_whole_turns
+from skidyn.robots import Robot, with_whole_turns
 
 if TYPE_CHECKING:
     from skidyn.evidence._problem import Problem
 
+#: Samples whose regressor is computed at once.
+CHUNK = 3072
 #: Columns of the rigid body weaker than this (relative, after pivoting) are dependent on others.
 RANK_TOLERANCE = 2e-6
 
@@ -25,16 +28,31 @@ def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> 
     """Averaged columns of the torque regressor, chunk by chunk; only the given ones if any."""
     assert problem.robot is not None
     robot = with_whole_turns(problem.robot)
-    index = np.arange(10 * robot.n_bodies) if index is None else index
-    rows = [np.zeros((count, len(index))) for count in problem.rows.counts]
+    columns = tuple(range(10 * robot.n_bodies) if index is None else index.tolist())
+    rows = [np.zeros((count, len(columns))) for count in problem.rows.counts]
     s, weights = problem.sampled(problem.rows.step)
     in_time = [RowsInTime.of(own) for own in weights]
-    for chunk, regressor in robot.iter_torque_regressor(s.q, s.dq, s.ddq):
+    first = first_columns(robot, columns)
+    motion = {"q": s.q, "dq": s.dq, "ddq": s.ddq}
+    for chunk, regressor in robot._engine.iter_regressor_columns(motion, columns, 0, CHUNK):
         for j, block in enumerate(rows):
             here, shares = in_time[j].within(chunk)
-            block[here] += shares @ regressor[j][index].T
+            block[here, first[j] :] += shares @ regressor[j, first[j] :].T
         tell("Computing the rigid body", chunk.stop / len(s.q))
     return rows
+
+
+@lru_cache(maxsize=64)
+def first_columns(robot: Robot, columns: tuple[int, ...]) -> list[int]:
+    """The first of some columns of the regressor that does not vanish, by joint.
+
+    A joint moves none of the bodies before it.
+    """
+    used = robot._engine.program("torque_regressor", robot._engine.gravity_key()).outputs
+    return [
+        min((i for i, c in enumerate(columns) if (j, c) in used), default=len(columns))
+        for j in range(robot.n_joints)
+    ]
 
 
 def independent_columns(rows: Array) -> NDArray[np.int64]:

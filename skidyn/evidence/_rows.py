@@ -189,15 +189,15 @@ class RowsInTime:
 
     Attributes
     ----------
-    order : ndarray of shape (n_rows,) of int
-        The rows in the order of their first samples.
+    order : ndarray of shape (n_rows,) of int, or None
+        The rows in the order of their first samples; None if they are in this order already.
     first, last : ndarray of shape (n_rows,) of int
         First and last sample of each row.
     weights : csr_matrix of shape (n_rows, n_samples)
         Sorted alike.
     """
 
-    order: NDArray[np.int64]
+    order: NDArray[np.int64] | None
     first: NDArray[np.int64]
     last: NDArray[np.int64]
     weights: csr_matrix
@@ -206,15 +206,21 @@ class RowsInTime:
     def of(cls, weights: csr_matrix) -> RowsInTime:
         """Sort rows whose samples are sorted."""
         first = weights.indices[weights.indptr[:-1]]
-        order = np.argsort(first, kind="stable")
         last = weights.indices[weights.indptr[1:] - 1]
+        if np.all(first[1:] >= first[:-1]):
+            return cls(None, first, last, weights)
+        order = np.argsort(first, kind="stable")
         return cls(order, first[order], last[order], weights[order])
 
-    def within(self, samples: slice) -> tuple[NDArray[np.int64], csr_matrix]:
+    def within(self, samples: slice) -> tuple[NDArray[np.int64] | slice, csr_matrix]:
         """Rows with samples in an interval, and their weights on these."""
         start = int(np.searchsorted(self.last, samples.start))
         stop = int(np.searchsorted(self.first, samples.stop))
-        return self.order[start:stop], self.weights[start:stop, samples]
+        rows = slice(start, stop)
+        weights = self.weights
+        if (stop - start, samples.stop - samples.start) != weights.shape:
+            weights = weights[rows, samples]
+        return rows if self.order is None else self.order[rows], weights
 
 
 def _scaled(weights: csr_matrix, factor: Array) -> csr_matrix:
@@ -268,15 +274,16 @@ def sliding_samples(
     ndarray of shape (n_samples, n_joints) of bool
     """
     margins = np.broadcast_to(margin, signals.n_joints)
-    sliding = np.zeros(signals.q.shape, dtype=bool)
+    sliding = valid.copy()
     for rows in signals.segments:
-        for joint in range(signals.n_joints):
-            velocity = signals.dq[rows, joint]
-            still = np.abs(velocity) <= REST * signals.unit[joint]
-            turns = np.flatnonzero(np.diff(np.sign(velocity)))
-            still[turns] = True
-            still[np.minimum(turns + 1, len(still) - 1)] = True
-            sliding[rows, joint] = ~widened(still, int(margins[joint])) & valid[rows, joint]
+        velocity = signals.dq[rows]
+        still = np.abs(velocity) <= REST * signals.unit
+        turns = np.diff(np.sign(velocity), axis=0) != 0
+        still[:-1] |= turns
+        still[1:] |= turns
+        for reach in set(margins.tolist()):
+            own = np.flatnonzero(margins == reach)
+            sliding[rows, own] &= ~widened(still[:, own], reach)
     return sliding
 
 
