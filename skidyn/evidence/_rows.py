@@ -382,19 +382,19 @@ def window_rows(
         As in :class:`Rows`.
     """
     spans = [_windows(signals.clock[rows], rows.start, window) for rows in signals.segments]
+    counts = [len(span.middle) for span in spans]
+    middle = np.concatenate([span.middle for span in spans])
+    name = np.repeat(signals.trajectory[[rows.start for rows in signals.segments]], counts)
+    eighth = np.concatenate([np.arange(n) * 8 // max(1, n) % 4 for n in counts])
     weights, trajectory, time, quarter = [], [], [], []
     for joint in range(signals.n_joints):
-        parts = [_weigh(span, use[:, joint]) for span in spans]
+        own = np.ascontiguousarray(use[:, joint])
+        parts = [_weigh(span, own) for span in spans]
         weights.append(_stack([part[0] for part in parts], signals.n_samples))
-        keep = [part[1] for part in parts]
-        labels = [
-            np.full(int(k.sum()), signals.trajectory[rows.start])
-            for k, rows in zip(keep, signals.segments, strict=True)
-        ]
-        trajectory.append(np.concatenate(labels))
-        time.append(np.concatenate([s.middle[k] for s, k in zip(spans, keep, strict=True)]))
-        eighths = [(np.arange(len(k)) * 8 // max(1, len(k)) % 4)[k] for k in keep]
-        quarter.append(np.concatenate(eighths))
+        keep = np.concatenate([part[1] for part in parts])
+        trajectory.append(name[keep])
+        time.append(middle[keep])
+        quarter.append(eighth[keep])
     return Rows(weights, trajectory, time, quarter, use, step)
 
 
@@ -404,15 +404,16 @@ class _Windows:
 
     middle: Array
     row: NDArray[np.int64]
-    sample: NDArray[np.int64]
+    sample: NDArray[np.int32]  # the type of indices that SciPy chooses, so that it copies none
     weight: Array
     full: Array  # weight of every window, (n_windows,)
 
 
 def _windows(time: Array, offset: int, window: float) -> _Windows:
     steps = np.diff(time)
-    forward = steps[steps > 0]
-    width = max(window, FEWEST_SAMPLES * np.median(forward)) if len(forward) else window
+    width = window
+    if FEWEST_SAMPLES * steps.max(initial=0.0) > window:
+        width = max(window, FEWEST_SAMPLES * np.median(steps[steps > 0]))
     middle = np.arange(time[0] + width / 2, time[-1] - width / 2 + 1e-9, width / 2)
     first = np.searchsorted(time, middle - width / 2)
     last = np.searchsorted(time, middle + width / 2)
@@ -422,30 +423,30 @@ def _windows(time: Array, offset: int, window: float) -> _Windows:
     sample = np.repeat(first, length) + within
     weight = np.cos(np.pi * (time[sample] - middle[row]) / width) ** 2
     full: Array = np.bincount(row, weight, minlength=len(middle)).astype(float)
-    return _Windows(middle, row, sample + offset, weight, full)
+    return _Windows(middle, row, (sample + offset).astype(np.int32), weight, full)
 
 
-Entries = tuple[NDArray[np.int64], NDArray[np.int64], Array, int]
+#: Number of samples of every kept window, and the samples and weights of one window after another.
+Entries = tuple[NDArray[np.int64], NDArray[np.int32], Array]
 
 
 def _weigh(span: _Windows, use: NDArray[np.bool_]) -> tuple[Entries, NDArray[np.bool_]]:
     """Weights of the samples in use, scaled to unit noise gain, and a mask of the kept windows."""
     n = len(span.middle)
-    kept = use[span.sample]
-    row, sample, weight = span.row[kept], span.sample[kept], span.weight[kept]
-    total = np.bincount(row, weight, minlength=n)
+    used = use[span.sample]
+    weight = span.weight * used
+    total = np.bincount(span.row, weight, n)
     keep = (total > 0) & (total >= LEAST_WEIGHT * span.full)
-    gain = np.sqrt(np.bincount(row, weight**2, minlength=n))
-    inside = keep[row]
-    number = np.cumsum(keep) - 1
-    row, sample = row[inside], sample[inside]
-    return (number[row], sample, weight[inside] / gain[row], int(keep.sum())), keep
+    gain = np.sqrt(np.bincount(span.row, weight**2, n))
+    inside = np.flatnonzero(used & keep[span.row])
+    row = span.row[inside]
+    length = np.bincount(row, minlength=n)[keep]
+    return (length, span.sample[inside], weight[inside] / gain[row]), keep
 
 
 def _stack(parts: list[Entries], n_samples: int) -> csr_matrix:
     """Rows of all segments; entries are sorted by row and by sample already."""
-    lengths = [np.bincount(part[0], minlength=part[3]) for part in parts]
-    start = np.cumsum(np.concatenate([[0], *lengths]))
-    sample = np.concatenate([part[1] for part in parts])
-    value = np.concatenate([part[2] for part in parts])
-    return scipy.sparse.csr_matrix((value, sample, start), shape=(len(start) - 1, n_samples))
+    lengths, samples, values = zip(*parts, strict=True)
+    start = np.concatenate([[0], *lengths]).cumsum(dtype=np.int32)
+    found = np.concatenate(values), np.concatenate(samples), start
+    return scipy.sparse.csr_matrix(found, shape=(len(start) - 1, n_samples))

@@ -16,7 +16,7 @@ import numpy as np
 from skidyn._exceptions import LogError, SkidynError
 from skidyn._signals import Array, Signals
 from skidyn.effects import Term, TermSum, make_terms
-from skidyn.evidence._evidence import Evidence, column_names
+from skidyn.evidence._evidence import Evidence, column_names, rows_of_problem
 from skidyn.evidence._motion_rows import motion_rows, read_motion
 from skidyn.evidence._parquet import ColumnMap, read_trajectories
 from skidyn.evidence._problem import Problem, hysteresis_joints
@@ -198,6 +198,20 @@ def evidence_of_signals(
         By trajectory and joint.
     """
     terms = tuple(terms)
+    problem = _problem(signals, torque, robot, terms, rigid_body=rigid_body, smooth=smooth)
+    return Evidence.from_problem(problem, terms)
+
+
+def _problem(
+    signals: Signals,
+    torque: Array,
+    robot: Robot,
+    terms: Sequence[Term],
+    *,
+    rigid_body: bool = True,
+    smooth: bool = True,
+) -> Problem:
+    """Averaged rows of signals, with the columns of all base parameters."""
     motion = read_motion(signals, smooth, torque)
     rows = motion_rows(motion, hysteresis_joints(terms))
     problem = Problem(
@@ -213,7 +227,7 @@ def evidence_of_signals(
         rigid_rows=[np.zeros((n, 0)) for n in rows.counts],
     )
     # All trajectories have the same columns, also those in which few joints move.
-    return Evidence.from_problem(problem.with_base_columns(), terms)
+    return problem.with_base_columns()
 
 
 def linear_terms(effects: Iterable[Any], n_joints: int) -> list[Term]:
@@ -263,16 +277,19 @@ def _of_files(
     sources: Sequence[Source], robot: Robot, terms: Sequence[Term], options: Options
 ) -> _Part:
     """Evidence of files, their trajectories numbered from 0."""
-    parts = (
-        _Part(evidence_of_signals(signals, torque, robot, terms), 1)
-        for path, left_out in sources
-        for k, (signals, torque) in enumerate(
-            read_trajectories(path, robot, columns=options.columns, max_rows=options.max_rows)
+    evidence = Evidence(column_names(robot, base_parameter_index(robot), terms), {}, {})
+    n = 0
+    for path, left_out in sources:
+        trajectories = read_trajectories(
+            path, robot, columns=options.columns, max_rows=options.max_rows
         )
-        if k not in left_out
-    )
-    nothing = _Part(Evidence(column_names(robot, base_parameter_index(robot), terms), {}, {}), 0)
-    return reduce(partial(_joined, groups=options.groups), parts, nothing)
+        for k, (signals, torque) in enumerate(trajectories):
+            if k not in left_out:
+                name = n if options.groups is None else n % options.groups
+                rows = rows_of_problem(_problem(signals, torque, robot, terms), terms)
+                own = {(name, joint): block for (_, joint), block in rows.items()}
+                evidence, n = evidence.with_rows(own), n + 1
+    return _Part(evidence, n)
 
 
 def _joined(one: _Part, other: _Part, groups: int | None) -> _Part:
