@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -89,6 +89,11 @@ def rates_of(values: Array, time: Array, segments: Iterable[slice]) -> Array:
         if rows.stop - rows.start > 1:
             rates[rows] = np.gradient(values[rows], time[rows], axis=0)
     return rates
+
+
+def joined(parts: Sequence[Array]) -> Array:
+    """Arrays one after another; the same one if it is alone."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _gaps(steps: Array) -> NDArray[np.intp]:

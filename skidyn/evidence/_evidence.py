@@ -29,6 +29,8 @@ from skidyn.robots import Robot
 Key = tuple[int, int]
 #: Coefficients of columns weaker than this, relative to the strongest direction, stay at zero.
 RANK_TOLERANCE = 1e-10
+#: Columns that are factorised at a time; more at a time are slower for so few rows.
+BLOCK = 8
 
 
 @dataclass(frozen=True)
@@ -127,8 +129,7 @@ class Evidence:
                     f"rows of trajectory {key[0]}, joint {key[1] + 1} have {block.shape[1]} "
                     f"columns; {len(self.columns)} and the torque are expected"
                 )
-            known = [factors[key]] if key in factors else []
-            factors[key] = _triangle(np.vstack([*known, block]))
+            factors[key] = _triangle(block, factors.get(key))
             counts[key] = counts.get(key, 0) + len(block)
         return Evidence(self.columns, factors, counts)
 
@@ -429,22 +430,23 @@ def column_names(
 def _add(
     factors: dict[Key, Array], counts: dict[Key, float], key: Key, factor: Array, count: float
 ) -> None:
-    """Add a factor, which is merged with the one that has its key already."""
-    if key in factors:
-        factors[key] = _triangle(np.vstack([factors[key], factor]))
-        counts[key] += count
-    else:
-        factors[key], counts[key] = factor, count
+    """Add a factor; it is merged with the one that has its key already, if there is one."""
+    factors[key] = _triangle(factor, factors[key]) if key in factors else factor
+    counts[key] = counts.get(key, 0) + count
 
 
-def _triangle(rows: Array) -> Array:
-    """Square upper triangular factor, padded with zero rows where there are few rows.
+def _triangle(rows: Array, known: Array | None = None) -> Array:
+    """Square upper triangular factor of rows, and of those of a known factor.
 
     A joint has no torque from the links before it and from friction of other joints. Such columns
-    of zeros are left out; the factor of the others is triangular in their places, too.
+    of zeros are left out; the factor of the others is triangular in their places, too. LAPACK's
+    routine for rows below a triangle leaves out the zeros of that.
     """
-    used = np.flatnonzero(rows.any(axis=0))
-    triangle = np.linalg.qr(rows[:, used], mode="r")
-    factor = np.zeros((rows.shape[1], rows.shape[1]))
-    factor[np.ix_(used[: len(triangle)], used)] = triangle
+    factor = np.zeros((rows.shape[1], rows.shape[1])) if known is None else known.copy()
+    used = np.flatnonzero(rows.any(axis=0) | factor.any(axis=0))
+    if len(used):
+        place = np.ix_(used, used)
+        size = min(BLOCK, len(used))
+        found = scipy.linalg.lapack.dtpqrt(0, size, factor[place], rows[:, used])
+        factor[place] = found[0]
     return factor

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -11,8 +12,8 @@ import scipy
 from numpy.typing import NDArray
 
 from skidyn._progress import tell
-from skidyn._signals import Array
-from skidyn.evidence._rows import RowsInTime
+from skidyn._signals import Array, joined
+from skidyn.evidence._rows import RowsInTime, on_diagonal
 from skidyn.robots import Robot, with_whole_turns
 
 if TYPE_CHECKING:
@@ -24,22 +25,26 @@ CHUNK = 3072
 RANK_TOLERANCE = 2e-6
 
 
-def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> list[Array]:
-    """Averaged columns of the torque regressor, chunk by chunk; only the given ones if any."""
-    assert problem.robot is not None
-    robot = with_whole_turns(problem.robot)
-    columns = tuple(range(10 * robot.n_bodies) if index is None else index.tolist())
-    rows = [np.zeros((count, len(columns))) for count in problem.rows.counts]
-    s, weights = problem.sampled(problem.rows.step)
-    in_time = [RowsInTime.of(own) for own in weights]
+def regressor_rows(problems: Sequence[Problem], index: NDArray[np.int64]) -> list[list[Array]]:
+    """Averaged columns of the torque regressor of one robot, by problem and joint.
+
+    The regressor is computed chunk by chunk; short recordings share one.
+    """
+    assert problems[0].robot is not None
+    robot, columns = with_whole_turns(problems[0].robot), tuple(index.tolist())
+    sampled = [problem.sampled(problem.rows.step) for problem in problems]
+    motion = {k: joined([getattr(s, k) for s, _ in sampled]) for k in ("q", "dq", "ddq")}
+    weights = [RowsInTime.of(on_diagonal(own)) for own in zip(*(w for _, w in sampled), strict=True)]
+    rows = [np.zeros((len(own.first), len(columns))) for own in weights]
     first = first_columns(robot, columns)
-    motion = {"q": s.q, "dq": s.dq, "ddq": s.ddq}
     for chunk, regressor in robot._engine.iter_regressor_columns(motion, columns, 0, CHUNK):
         for j, block in enumerate(rows):
-            here, shares = in_time[j].within(chunk)
+            here, shares = weights[j].within(chunk)
             block[here, first[j] :] += shares @ regressor[j, first[j] :].T
-        tell("Computing the rigid body", chunk.stop / len(s.q))
-    return rows
+        tell("Computing the rigid body", chunk.stop / len(motion["q"]))
+    ends = np.cumsum([problem.rows.counts for problem in problems], axis=0)[:-1]
+    parts = [np.split(block, ends[:, j]) for j, block in enumerate(rows)]
+    return [list(own) for own in zip(*parts, strict=True)]
 
 
 @lru_cache(maxsize=64)

@@ -236,6 +236,16 @@ def averaged(weights: csr_matrix, values: Array) -> Array:
     return np.asarray(weights @ values)
 
 
+def on_diagonal(weights: Sequence[csr_matrix]) -> csr_matrix:
+    """Weights of the rows of several recordings, for their samples one after another."""
+    if len(weights) == 1:
+        return weights[0]
+    first = np.cumsum([0, *(w.shape[1] for w in weights)], dtype=np.int32)
+    samples = [w.indices + start for w, start in zip(weights, first, strict=False)]
+    lengths = [np.diff(w.indptr) for w in weights]
+    return _stack(list(zip(lengths, samples, (w.data for w in weights), strict=True)), first[-1])
+
+
 def every_sample(signals: Signals) -> Rows:
     """One row per sample, for data without a clock.
 
