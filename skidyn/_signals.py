@@ -286,6 +286,7 @@ class Signals:
             new.__dict__["sign"] = self.sign
         if _OF_FIT >= set(changes):
             new.__dict__["_kept"] = self.__dict__.setdefault("_kept", {})
+        if not {"time", "trajectory"} & set(changes):
             for name in _OF_CLOCK & set(self.__dict__):
                 new.__dict__[name] = self.__dict__[name]
         return new

@@ -74,7 +74,7 @@ def leaps(
     # Most signals have no leap, and then this is all that is computed.
     if not (_farthest_from_median(values, signals.segments) > least).any():
         return broken
-    away = np.zeros(values.shape)
+    away = np.zeros_like(values)
     for rows in _long_enough(signals.segments):
         away[rows] = values[rows] - _running_median(values[rows])
     distance = np.abs(away)
@@ -96,7 +96,7 @@ def _least(
     names = np.unique(signals.trajectory)
     # One that rests for most of a recording has a small range there.
     whole = _range(values)
-    least = np.empty(values.shape)
+    least = np.empty_like(values)
     for name in names:
         own = signals.trajectory == name
         least[own] = share * (_range(values[own]) if len(names) > 1 else whole)
@@ -140,7 +140,7 @@ def _farthest_from_median(values: Array, segments: Iterable[slice]) -> Array:
     their mean.
     """
     middle = WIDTH // 2
-    farthest = np.zeros(values.shape)
+    farthest = np.zeros_like(values)
     for rows in _long_enough(segments):
         padded, n, own = _padded(values[rows]), rows.stop - rows.start, values[rows]
         for lag in range(1, middle + 1):
@@ -279,10 +279,10 @@ def _velocity_error(signals: Signals) -> Array:
         q, dq, clock = signals.q[rows], signals.dq[rows], signals.clock[rows]
         moved = np.zeros_like(q)
         np.cumsum((dq[1:] + dq[:-1]) / 2 * np.diff(clock)[:, None], axis=0, out=moved[1:])
-        place = np.arange(len(q))
-        before, after = np.maximum(place - REACH, 0), np.minimum(place + REACH, len(q) - 1)
-        time = np.maximum(clock[after] - clock[before], 1e-300)
-        off[rows] = ((q - moved)[after] - (q - moved)[before]) / time[:, None]
+        place = np.clip(np.arange(-REACH, len(q) + REACH), 0, len(q) - 1)
+        apart, time = (q - moved)[place], clock[place]
+        time = np.maximum(time[2 * REACH :] - time[: -2 * REACH], 1e-300)
+        off[rows] = (apart[2 * REACH :] - apart[: -2 * REACH]) / time[:, None]
     return off
 
 

@@ -396,8 +396,10 @@ def rows_of_problem(problem: Problem, terms: Iterable[Term]) -> dict[Key, Array]
     rows = {}
     for j, (block, y) in enumerate(zip(design, problem.target, strict=True)):
         whole, trajectory = np.column_stack([block, y]), problem.rows.trajectory[j]
-        for name in np.unique(trajectory):
-            rows[int(name), j] = whole[trajectory == name]
+        for name in problem.rows.recordings:
+            here = trajectory == name
+            if here.any():
+                rows[int(name), j] = whole[here]
     return rows
 
 

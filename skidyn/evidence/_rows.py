@@ -368,11 +368,14 @@ def interpolation(segments: Sequence[slice], few: Sequence[slice], step: int) ->
 
 def widened(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
     """A mask extended along its first axis by some samples on each side."""
-    total = np.zeros((len(mask) + 1, *mask.shape[1:]), dtype=np.int64)
-    np.cumsum(mask, axis=0, out=total[1:])
-    place = np.arange(len(mask))
-    before, after = np.maximum(place - reach, 0), np.minimum(place + reach + 1, len(mask))
-    return np.asarray(total[after] > total[before])
+    wide = np.zeros((len(mask) + 2 * reach, *mask.shape[1:]), dtype=bool)
+    wide[reach : reach + len(mask)] = mask
+    width, whole = 1, 2 * reach + 1
+    while width < whole:  # every sample shows those from it on, twice as many each time
+        step = min(width, whole - width)
+        wide[:-step] |= wide[step:]
+        width += step
+    return wide[: len(mask)]
 
 
 def window_rows(
