@@ -89,17 +89,16 @@ def leaps(
     return broken
 
 
-def _least(
-    values: Array, signals: Signals, share: float, turns: NDArray[np.bool_] | None
-) -> Array:
+def _least(values: Array, signals: Signals, share: float, turns: NDArray[np.bool_] | None) -> Array:
     """Distance from the running median above which a sample may be broken."""
-    names = np.unique(signals.trajectory)
+    names = np.unique(signals.trajectory[[rows.start for rows in signals.segments]])
     # One that rests for most of a recording has a small range there.
     whole = _range(values)
     least = np.empty_like(values)
-    for name in names:
+    least[:] = share * whole
+    for name in names if len(names) > 1 else ():
         own = signals.trajectory == name
-        least[own] = share * (_range(values[own]) if len(names) > 1 else whole)
+        least[own] = share * _range(values[own])
     if turns is not None:
         np.copyto(least, whole, where=turns)
     # At either end of a trajectory a step cannot be distinguished from a jump and back.

@@ -447,8 +447,7 @@ def _triangle(rows: Array, known: Array | None = None) -> Array:
     factor = np.zeros((rows.shape[1], rows.shape[1])) if known is None else known.copy()
     used = np.flatnonzero(rows.any(axis=0) | factor.any(axis=0))
     if len(used):
-        place = np.ix_(used, used)
+        place = used[:, None], used
         size = min(BLOCK, len(used))
-        found = scipy.linalg.lapack.dtpqrt(0, size, factor[place], rows[:, used])
-        factor[place] = found[0]
+        factor[place] = scipy.linalg.lapack.dtpqrt(0, size, factor[place], rows[:, used])[0]
     return factor

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from skidyn._progress import tell
 from skidyn._signals import Array, joined
-from skidyn.evidence._rows import RowsInTime, on_diagonal
+from skidyn.evidence._rows import RowsInTime
 from skidyn.robots import Robot, with_whole_turns
 
 if TYPE_CHECKING:
@@ -32,19 +33,27 @@ def regressor_rows(problems: Sequence[Problem], index: NDArray[np.int64]) -> lis
     """
     assert problems[0].robot is not None
     robot, columns = with_whole_turns(problems[0].robot), tuple(index.tolist())
+    rows = [[np.zeros((n, len(columns))) for n in problem.rows.counts] for problem in problems]
     sampled = [problem.sampled(problem.rows.step) for problem in problems]
+    in_time = [[RowsInTime.of(own) for own in weights] for _, weights in sampled]
     motion = {k: joined([getattr(s, k) for s, _ in sampled]) for k in ("q", "dq", "ddq")}
-    weights = [RowsInTime.of(on_diagonal(own)) for own in zip(*(w for _, w in sampled), strict=True)]
-    rows = [np.zeros((len(own.first), len(columns))) for own in weights]
+    starts = np.cumsum([0, *(s.n_samples for s, _ in sampled)]).tolist()
     first = first_columns(robot, columns)
     for chunk, regressor in robot._engine.iter_regressor_columns(motion, columns, 0, CHUNK):
-        for j, block in enumerate(rows):
-            here, shares = weights[j].within(chunk)
-            block[here, first[j] :] += shares @ regressor[j, first[j] :].T
-        tell("Computing the rigid body", chunk.stop / len(motion["q"]))
-    ends = np.cumsum([problem.rows.counts for problem in problems], axis=0)[:-1]
-    parts = [np.split(block, ends[:, j]) for j, block in enumerate(rows)]
-    return [list(own) for own in zip(*parts, strict=True)]
+        for k, samples, part in _in_chunk(chunk, starts):
+            for j, block in enumerate(rows[k]):
+                here, shares = in_time[k][j].within(samples)
+                block[here, first[j] :] += shares @ regressor[j, first[j] :, part].T
+        tell("Computing the rigid body", chunk.stop / starts[-1])
+    return rows
+
+
+def _in_chunk(chunk: slice, starts: Sequence[int]) -> Iterator[tuple[int, slice, slice]]:
+    """Recordings with samples in a chunk, these samples, and their places in the chunk."""
+    for k, (start, stop) in enumerate(pairwise(starts)):
+        a, b = max(start, chunk.start), min(stop, chunk.stop)
+        if a < b:
+            yield k, slice(a - start, b - start), slice(a - chunk.start, b - chunk.start)
 
 
 @lru_cache(maxsize=64)

@@ -236,16 +236,6 @@ def averaged(weights: csr_matrix, values: Array) -> Array:
     return np.asarray(weights @ values)
 
 
-def on_diagonal(weights: Sequence[csr_matrix]) -> csr_matrix:
-    """Weights of the rows of several recordings, for their samples one after another."""
-    if len(weights) == 1:
-        return weights[0]
-    first = np.cumsum([0, *(w.shape[1] for w in weights)], dtype=np.int32)
-    samples = [w.indices + start for w, start in zip(weights, first, strict=False)]
-    lengths = [np.diff(w.indptr) for w in weights]
-    return _stack(list(zip(lengths, samples, (w.data for w in weights), strict=True)), first[-1])
-
-
 def every_sample(signals: Signals) -> Rows:
     """One row per sample, for data without a clock.
 
@@ -446,7 +436,7 @@ Entries = tuple[NDArray[np.int64], NDArray[np.int32], Array]
 def _weigh(span: _Windows, use: NDArray[np.bool_]) -> tuple[Entries, NDArray[np.bool_]]:
     """Weights of the samples in use, scaled to unit noise gain, and a mask of the kept windows."""
     n = len(span.middle)
-    used = use[span.sample]
+    used = use.take(span.sample)
     weight = span.weight * used
     total = np.bincount(span.row, weight, n)
     keep = (total > 0) & (total >= LEAST_WEIGHT * span.full)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Evidence of data sets larger than memory: one trajectory at a time, on one machine or many."""
+"""Evidence of data sets larger than memory: few trajectories at a time, on one machine or many."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def evidence_from_parquet(
     n_jobs: int | None = None,
     client: Any = None,
 ) -> Evidence:
-    """Evidence of Parquet files, with at most one trajectory in memory.
+    """Evidence of Parquet files, with one trajectory in memory, or some short ones.
 
     Parameters
     ----------
