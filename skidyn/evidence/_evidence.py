@@ -297,6 +297,7 @@ class Evidence:
             raise SkidynError("no evidence: every trajectory was left out")
         index = self._index(columns)
         stacked = self.stacked(noise)
+        stacked = stacked[stacked.any(axis=1)]  # factors have rows of zeros
         a, y = stacked[:, index], stacked[:, -1]
         size = np.linalg.norm(a, axis=0)
         size[size == 0] = 1.0
