@@ -214,11 +214,10 @@ class RowsInTime:
 
     def within(self, samples: slice) -> tuple[NDArray[np.int64] | slice, csr_matrix]:
         """Rows with samples in an interval, and their weights on these."""
-        start = int(np.searchsorted(self.last, samples.start))
-        stop = int(np.searchsorted(self.first, samples.stop))
-        rows = slice(start, stop)
-        weights = self.weights
-        if (stop - start, samples.stop - samples.start) != weights.shape:
+        rows, weights = slice(None), self.weights
+        if samples.stop - samples.start < weights.shape[1]:
+            start = int(np.searchsorted(self.last, samples.start))
+            rows = slice(start, int(np.searchsorted(self.first, samples.stop)))
             weights = weights[rows, samples]
         return rows if self.order is None else self.order[rows], weights
 
