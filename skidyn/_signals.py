@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -91,8 +91,15 @@ def rates_of(values: Array, time: Array, segments: Iterable[slice]) -> Array:
     return rates
 
 
+def joined(parts: Sequence[Array]) -> Array:
+    """Arrays one after another; the same one if it is alone."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
 def _gaps(steps: Array) -> NDArray[np.intp]:
     """Steps back, and steps much longer than most of the same trajectory."""
+    if not len(steps) or 0 < steps.max() <= GAP_STEPS * steps.min():
+        return np.zeros(0, dtype=np.intp)  # their median is no less than the shortest one
     forward = steps[steps > 0]
     longest = GAP_STEPS * np.median(forward) if len(forward) else np.inf
     return np.flatnonzero((steps < 0) | (steps > longest))
@@ -279,6 +286,7 @@ class Signals:
             new.__dict__["sign"] = self.sign
         if _OF_FIT >= set(changes):
             new.__dict__["_kept"] = self.__dict__.setdefault("_kept", {})
+        if not {"time", "trajectory"} & set(changes):
             for name in _OF_CLOCK & set(self.__dict__):
                 new.__dict__[name] = self.__dict__[name]
         return new

@@ -11,6 +11,7 @@ informed: one wrong acceleration may weigh more than a whole recording.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
@@ -68,41 +69,84 @@ def leaps(
     -------
     ndarray of shape (n_samples, n_joints) of bool
     """
-    away = np.zeros(values.shape)
-    least = np.where(np.zeros(values.shape, dtype=bool) if turns is None else turns, 1.0, share)
-    for rows in signals.segments:
-        if rows.stop - rows.start >= 2 * WIDTH:
-            block = values[rows]
-            away[rows] = block - _running_median(block)
-            # At either end of a trajectory a step cannot be distinguished from a jump and back.
-            for end in (rows.start, rows.stop - WIDTH // 2):
-                least[end : end + WIDTH // 2] = 1.0
+    least = _least(values, signals, share, turns)
     broken = np.zeros(values.shape, dtype=bool)
-    coarse = None
-    # One that rests for most of a recording has a small range there.
-    whole = np.diff(np.quantile(values, TAILS, axis=0), axis=0)
-    for name in np.unique(signals.trajectory):
+    # Most signals have no leap, and then this is all that is computed.
+    if not (_farthest_from_median(values, signals.segments) > least).any():
+        return broken
+    away = np.zeros_like(values)
+    for rows in _long_enough(signals.segments):
+        away[rows] = values[rows] - _running_median(values[rows])
+    distance = np.abs(away)
+    far = distance > least
+    if not far.any():
+        return broken
+    coarse = STEPS * _smallest_change(values)
+    for name in np.unique(signals.trajectory[far.any(axis=1)]):
         own = signals.trajectory == name
-        bottom, top = np.quantile(values[own], TAILS, axis=0)
-        distance = np.abs(away[own])
-        # Strictly above: a constant signal has no range and no jumps.
-        far = distance > np.where(least[own] < 1.0, least[own] * (top - bottom), whole)
-        if not far.any():
-            continue
-        coarse = STEPS * _smallest_change(values) if coarse is None else coarse
-        low, high = np.quantile(away[own], TAILS, axis=0)
-        broken[own] = far & (distance > np.maximum(FAR * (high - low), coarse))
+        spread = _range(away[own])
+        broken[own] = far[own] & (distance[own] > np.maximum(FAR * spread, coarse))
     return broken
+
+
+def _least(values: Array, signals: Signals, share: float, turns: NDArray[np.bool_] | None) -> Array:
+    """Distance from the running median above which a sample may be broken."""
+    names = np.unique(signals.trajectory[[rows.start for rows in signals.segments]])
+    # One that rests for most of a recording has a small range there.
+    whole = _range(values)
+    least = np.empty_like(values)
+    least[:] = share * whole
+    for name in names if len(names) > 1 else ():
+        own = signals.trajectory == name
+        least[own] = share * _range(values[own])
+    if turns is not None:
+        np.copyto(least, whole, where=turns)
+    # At either end of a trajectory a step cannot be distinguished from a jump and back.
+    for rows in signals.segments:
+        for end in (slice(0, WIDTH // 2), slice(-(WIDTH // 2), None)):
+            least[rows][end] = whole
+    return least
+
+
+def _range(values: Array) -> Array:
+    """Range of each column without its tails."""
+    bottom, top = np.quantile(values, TAILS, axis=0)
+    return np.asarray(top - bottom)
+
+
+def _long_enough(segments: Iterable[slice]) -> list[slice]:
+    """Segments that have a running median."""
+    return [rows for rows in segments if rows.stop - rows.start >= 2 * WIDTH]
+
+
+def _padded(values: Array) -> Array:
+    """Values reflected at either end."""
+    middle = WIDTH // 2
+    return np.concatenate([values[:middle][::-1], values, values[-middle:][::-1]])
 
 
 def _running_median(values: Array) -> Array:
     """Running median of each column, reflected at either end."""
+    windows = sliding_window_view(_padded(values), WIDTH, axis=0)
+    return np.asarray(np.partition(windows, WIDTH // 2, axis=-1)[..., WIDTH // 2])
+
+
+def _farthest_from_median(values: Array, segments: Iterable[slice]) -> Array:
+    """No less than the distance of every sample from the running median.
+
+    More than half of a window is on the same side of a sample as the median and no nearer. So are
+    both samples of at least one of the pairs that are equally far before and after it, and then
+    their mean.
+    """
     middle = WIDTH // 2
-    result = np.empty_like(values)
-    for k, column in enumerate(values.T):
-        windows = sliding_window_view(np.pad(column, middle, mode="symmetric"), WIDTH)
-        result[:, k] = np.partition(windows, middle, axis=1)[:, middle]
-    return result
+    farthest = np.zeros_like(values)
+    for rows in _long_enough(segments):
+        padded, n, own = _padded(values[rows]), rows.stop - rows.start, values[rows]
+        for lag in range(1, middle + 1):
+            before, after = (padded[middle + way :][:n] for way in (-lag, lag))
+            mean = (before + after) / 2
+            np.maximum(farthest[rows], np.abs(mean - own), out=farthest[rows])
+    return farthest
 
 
 def _smallest_change(values: Array) -> Array:
@@ -169,12 +213,11 @@ def torn(signals: Signals) -> NDArray[np.bool_]:
 def _jumps(signals: Signals) -> NDArray[np.bool_]:
     """Samples at which a position leaves the line between its neighbours, and those in between."""
     near, far = (_off_line(signals, lag) for lag in (1, JUMP_LAG))
-    least = np.maximum(
-        JUMP_OVER_MEDIAN * np.median(near, axis=0),
-        JUMP_OVER_TAIL * np.quantile(near, 0.99, axis=0),
-    )
-    jump = near > np.maximum(least, JUMP_SHARE * far)
+    jump = near > JUMP_SHARE * far
     if jump.any():
+        jump &= near > JUMP_OVER_TAIL * np.quantile(near, 0.99, axis=0)
+    if jump.any():
+        jump &= near > JUMP_OVER_MEDIAN * np.median(near, axis=0)
         jump &= near > JUMP_STEPS * _smallest_change(signals.q)
     for k in np.flatnonzero(jump.any(axis=0)):
         for last, first in pairwise(np.flatnonzero(jump[:, k])):
@@ -203,8 +246,10 @@ def _off_line(signals: Signals, lag: int) -> Array:
 def _other_velocity(signals: Signals) -> NDArray[np.bool_]:
     """Samples around which the logged velocity is not that with which the position changes."""
     off = _velocity_error(signals)
-    low, high = np.quantile(off, TAILS, axis=0)
-    least = np.maximum(FAR * (high - low), VELOCITY_SHARE * np.ptp(signals.dq, axis=0))
+    least = VELOCITY_SHARE * np.ptp(signals.dq, axis=0)
+    if not (np.abs(off) > BENT * least).any():
+        return np.zeros(off.shape, dtype=bool)
+    least = np.maximum(FAR * _range(off), least)
     off = np.abs(off)
     other = off > least
     smoothed = signals.once("smooth motion", lambda: smooth_motion(signals))
@@ -233,10 +278,10 @@ def _velocity_error(signals: Signals) -> Array:
         q, dq, clock = signals.q[rows], signals.dq[rows], signals.clock[rows]
         moved = np.zeros_like(q)
         np.cumsum((dq[1:] + dq[:-1]) / 2 * np.diff(clock)[:, None], axis=0, out=moved[1:])
-        place = np.arange(len(q))
-        before, after = np.maximum(place - REACH, 0), np.minimum(place + REACH, len(q) - 1)
-        time = np.maximum(clock[after] - clock[before], 1e-300)
-        off[rows] = ((q - moved)[after] - (q - moved)[before]) / time[:, None]
+        place = np.clip(np.arange(-REACH, len(q) + REACH), 0, len(q) - 1)
+        apart, time = (q - moved)[place], clock[place]
+        time = np.maximum(time[2 * REACH :] - time[: -2 * REACH], 1e-300)
+        off[rows] = (apart[2 * REACH :] - apart[: -2 * REACH]) / time[:, None]
     return off
 
 

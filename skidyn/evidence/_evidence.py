@@ -29,6 +29,8 @@ from skidyn.robots import Robot
 Key = tuple[int, int]
 #: Coefficients of columns weaker than this, relative to the strongest direction, stay at zero.
 RANK_TOLERANCE = 1e-10
+#: Columns that are factorised at a time; more at a time are slower for so few rows.
+BLOCK = 8
 
 
 @dataclass(frozen=True)
@@ -80,17 +82,7 @@ class Evidence:
         SkidynError
             Rows have the wrong width.
         """
-        for key, block in rows.items():
-            if block.shape[1] != len(columns) + 1:
-                raise SkidynError(
-                    f"rows of trajectory {key[0]}, joint {key[1] + 1} have {block.shape[1]} "
-                    f"columns; {len(columns)} and the torque are expected"
-                )
-        return cls(
-            tuple(columns),
-            {key: _triangle(block) for key, block in rows.items()},
-            {key: len(block) for key, block in rows.items()},
-        )
+        return cls(tuple(columns), {}, {}).with_rows(rows)
 
     @classmethod
     def from_problem(cls, problem: Problem, terms: Iterable[Term]) -> Evidence:
@@ -110,13 +102,36 @@ class Evidence:
         """
         terms = list(terms)
         names = column_names(problem.robot, problem.rigid_index, terms)
-        design = problem.design([problem.term_rows(t) for t in terms])
-        rows = {}
-        for j, (block, y) in enumerate(zip(design, problem.target, strict=True)):
-            for name in np.unique(problem.rows.trajectory[j]):
-                here = problem.rows.trajectory[j] == name
-                rows[int(name), j] = np.column_stack([block[here], y[here]])
-        return cls.from_rows(names, rows)
+        return cls.from_rows(names, rows_of_problem(problem, terms))
+
+    def with_rows(self, rows: Mapping[Key, Array]) -> Evidence:
+        """The same evidence with further rows, which takes less time than to add their evidence.
+
+        Parameters
+        ----------
+        rows : mapping of (int, int) to ndarray of shape (n_rows, n_columns + 1)
+            [columns | torque] of every trajectory and joint.
+
+        Returns
+        -------
+        Evidence
+            The same columns.
+
+        Raises
+        ------
+        SkidynError
+            Rows have the wrong width.
+        """
+        factors, counts = dict(self.factors), dict(self.counts)
+        for key, block in rows.items():
+            if block.shape[1] != len(self.columns) + 1:
+                raise SkidynError(
+                    f"rows of trajectory {key[0]}, joint {key[1] + 1} have {block.shape[1]} "
+                    f"columns; {len(self.columns)} and the torque are expected"
+                )
+            factors[key] = _triangle(block, factors.get(key))
+            counts[key] = counts.get(key, 0) + len(block)
+        return Evidence(self.columns, factors, counts)
 
     @property
     def trajectories(self) -> list[int]:
@@ -133,11 +148,7 @@ class Evidence:
             raise SkidynError("evidence of different columns cannot be merged")
         factors, counts = dict(self.factors), dict(self.counts)
         for key, factor in other.factors.items():
-            if key in factors:
-                factors[key] = _triangle(np.vstack([factors[key], factor]))
-                counts[key] += other.counts[key]
-            else:
-                factors[key], counts[key] = factor, other.counts[key]
+            _add(factors, counts, key, factor, other.counts[key])
         return Evidence(self.columns, factors, counts)
 
     def scaled(self, weight: float) -> Evidence:
@@ -197,12 +208,12 @@ class Evidence:
         Evidence
             The same columns.
         """
-        result = Evidence(self.columns, {}, {})
+        factors: dict[Key, Array] = {}
+        counts: dict[Key, float] = {}
         for (trajectory, joint), factor in self.factors.items():
             number = trajectory + by if groups is None else (trajectory + by) % groups
-            key, count = (number, joint), self.counts[trajectory, joint]
-            result += Evidence(self.columns, {key: factor}, {key: count})
-        return result
+            _add(factors, counts, (number, joint), factor, self.counts[trajectory, joint])
+        return Evidence(self.columns, factors, counts)
 
     def select(self, columns: Sequence[str]) -> Evidence:
         """Evidence of a model with fewer columns.
@@ -286,6 +297,7 @@ class Evidence:
             raise SkidynError("no evidence: every trajectory was left out")
         index = self._index(columns)
         stacked = self.stacked(noise)
+        stacked = stacked[stacked.any(axis=1)]  # factors have rows of zeros
         a, y = stacked[:, index], stacked[:, -1]
         size = np.linalg.norm(a, axis=0)
         size[size == 0] = 1.0
@@ -367,6 +379,31 @@ class Evidence:
         return [self.columns.index(name) for name in columns]
 
 
+def rows_of_problem(problem: Problem, terms: Iterable[Term]) -> dict[Key, Array]:
+    """[columns | torque] of the averaged rows of a problem, by trajectory and joint.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows.
+    terms : iterable of Term
+        Effects beside the rigid body.
+
+    Returns
+    -------
+    dict of (int, int) to ndarray of shape (n_rows, n_columns + 1)
+    """
+    design = problem.design([problem.term_rows(t) for t in terms])
+    rows = {}
+    for j, (block, y) in enumerate(zip(design, problem.target, strict=True)):
+        whole, trajectory = np.column_stack([block, y]), problem.rows.trajectory[j]
+        for name in problem.rows.recordings:
+            here = trajectory == name
+            if here.any():
+                rows[int(name), j] = whole[here]
+    return rows
+
+
 def column_names(
     robot: Robot | None, rigid_index: Sequence[int] | NDArray[np.int64], terms: Iterable[Term]
 ) -> tuple[str, ...]:
@@ -386,14 +423,32 @@ def column_names(
     tuple of str
         Such as ``"m_link1"`` and ``"viscous.Fv[1]"``, joints counted from 1.
     """
-    names = [] if robot is None else [robot.parameter_names[i] for i in rigid_index]
-    return (*names, *TermSum(terms).names)
+    rigid: list[str] = []
+    if robot is not None:
+        names = robot.parameter_names
+        rigid = [names[i] for i in rigid_index]
+    return (*rigid, *TermSum(terms).names)
 
 
-def _triangle(rows: Array) -> Array:
-    """Square upper triangular factor, padded with zero rows where there are few rows."""
-    width = rows.shape[1]
-    factor: Array = np.asarray(np.linalg.qr(rows, mode="r"))
-    if len(factor) < width:
-        factor = np.vstack([factor, np.zeros((width - len(factor), width))])
+def _add(
+    factors: dict[Key, Array], counts: dict[Key, float], key: Key, factor: Array, count: float
+) -> None:
+    """Add a factor; it is merged with the one that has its key already, if there is one."""
+    factors[key] = _triangle(factor, factors[key]) if key in factors else factor
+    counts[key] = counts.get(key, 0) + count
+
+
+def _triangle(rows: Array, known: Array | None = None) -> Array:
+    """Square upper triangular factor of rows, and of those of a known factor.
+
+    A joint has no torque from the links before it and from friction of other joints. Such columns
+    of zeros are left out; the factor of the others is triangular in their places, too. LAPACK's
+    routine for rows below a triangle leaves out the zeros of that.
+    """
+    factor = np.zeros((rows.shape[1], rows.shape[1])) if known is None else known.copy()
+    used = np.flatnonzero(rows.any(axis=0) | factor.any(axis=0))
+    if len(used):
+        place = used[:, None], used
+        size = min(BLOCK, len(used))
+        factor[place] = scipy.linalg.lapack.dtpqrt(0, size, factor[place], rows[:, used])[0]
     return factor

@@ -16,6 +16,7 @@ from skidyn._signals import Array, Signals, blocks_held_out
 from skidyn.effects import Term
 from skidyn.evidence._evidence import Evidence, Key
 from skidyn.evidence._motion_rows import MOST_FOLDS
+from skidyn.evidence._rigid_rows import first_columns
 from skidyn.evidence._streaming import linear_terms
 from skidyn.robots import BaseParameters, Robot, find_base_parameters
 
@@ -270,12 +271,7 @@ class _Layout:
                 effects[j] += [(len(names) + k, block[:, k]) for k in range(block.shape[1])]
             names += term.names
         columns = tuple(int(i) for i in base.index)
-        used = robot._engine.program("torque_regressor", robot._engine.gravity_key()).outputs
-        first = [
-            min((i for i, c in enumerate(columns) if (j, c) in used), default=len(columns))
-            for j in range(robot.n_joints)
-        ]
-        return cls(columns, names, first, effects)
+        return cls(columns, names, first_columns(robot, columns), effects)
 
     @property
     def spare(self) -> int:

@@ -38,7 +38,7 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> Signals:
     q, dq, ddq = (np.array(x, dtype=float) for x in (signals.q, signals.dq, signals.ddq))
     valid = np.ones(signals.q.shape, dtype=bool)
     for rows in signals.segments:
-        own = signals.take(rows).rate
+        own = signals.take(rows).rate if len(signals.segments) > 1 else rate
         own = own if abs(own - rate) > EVEN_STEPS * rate else rate  # recordings of several rates
         width, _ = _half_width(own, cutoff)
         # Irregular samples are too many for their median step, or too few for the time they span.

@@ -143,7 +143,8 @@ def _decoded(path: Path, parquet: Any, robot: Robot, columns: ColumnMap | None) 
         yield layout
         # Threads of the decoder would compete with the other workers of a machine.
         for batch in file.iter_batches(BATCH_ROWS, columns=layout.names, use_threads=False):
-            table = np.empty((batch.num_rows, len(layout.names)))
+            # Channels one after another in memory: they are read, smoothed and sorted by channel.
+            table = np.empty((batch.num_rows, len(layout.names)), order="F")
             for k, name in enumerate(layout.names):
                 table[:, k] = _numbers(batch.column(name), name, path)
             _refuse_missing(table, layout.names, path, row)

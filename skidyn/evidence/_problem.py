@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import chain, groupby
+from itertools import chain, groupby, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -192,12 +192,15 @@ class Problem:
 
     def design(self, blocks: Sequence[dict[int, Array]]) -> list[Array]:
         """Rigid-body columns and blocks of columns side by side, per joint."""
-        design = []
-        for j in range(self.n_joints):
-            n_rows = int(self.rows.counts[j])
-            parts = [self.rigid_rows[j]]
-            parts += [b[j] if j in b else np.zeros((n_rows, width(b))) for b in blocks]
-            design.append(np.hstack(parts))
+        start = self.rigid_rows[0].shape[1]
+        ends = np.cumsum([start, *map(width, blocks)]).tolist()
+        places = [slice(a, b) for a, b in pairwise(ends)]
+        design = [np.zeros((len(rows), ends[-1])) for rows in self.rigid_rows]
+        for j, rows in enumerate(design):
+            rows[:, :start] = self.rigid_rows[j]
+            for own, block in zip(places, blocks, strict=True):
+                if j in block:
+                    rows[:, own] = block[j]
         return design
 
     def soft(self, terms: Sequence[Term]) -> list[tuple[slice, float]]:
@@ -212,7 +215,7 @@ class Problem:
         base = base_parameter_index(self.robot)
         if len(base) == len(self.rigid_index):
             return self
-        return replace(self, rigid_index=base, rigid_rows=regressor_rows(self, base))
+        return with_rigid_columns([self], base)[0]
 
     def fit(self, terms: Iterable[Term], sigma: Array | None = None, passes: int = 1) -> Fit:
         """Weighted least squares of the rigid body and terms.
@@ -404,6 +407,14 @@ def _add(torque: Array, signals: Signals, term: Term, coefficients: Array) -> No
         torque[:, j] += block @ coefficients
 
 
+def with_rigid_columns(problems: Sequence[Problem], index: NDArray[np.int64]) -> list[Problem]:
+    """The same problems of one robot with the columns of some rigid-body parameters."""
+    return [
+        replace(problem, rigid_index=index, rigid_rows=rows)
+        for problem, rows in zip(problems, regressor_rows(problems, index), strict=True)
+    ]
+
+
 def hysteresis_joints(terms: Iterable[Term]) -> list[int]:
     """Joints, from 0, whose friction at reversals some of the terms describe."""
     joints = {j for t in terms if t.effect.family == "hysteresis" for j in t.places}
@@ -546,7 +557,7 @@ def _add_rigid_body(problem: Problem) -> None:
     """Average the torque regressor and keep its independent columns."""
     assert problem.robot is not None
     base = base_parameter_index(problem.robot)
-    rows = regressor_rows(problem, base)
+    (rows,) = regressor_rows([problem], base)
     shown = independent_columns(np.vstack(rows))
     problem.rigid_index = base[shown]
     problem.rigid_rows = (

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,31 +13,60 @@ import scipy
 from numpy.typing import NDArray
 
 from skidyn._progress import tell
-from skidyn._signals import Array
+from skidyn._signals import Array, joined
 from skidyn.evidence._rows import RowsInTime
-from skidyn.robots import with_whole_turns
+from skidyn.robots import Robot, with_whole_turns
 
 if TYPE_CHECKING:
     from skidyn.evidence._problem import Problem
 
+#: Samples whose regressor is computed at once.
+CHUNK = 3072
 #: Columns of the rigid body weaker than this (relative, after pivoting) are dependent on others.
 RANK_TOLERANCE = 2e-6
 
 
-def regressor_rows(problem: Problem, index: NDArray[np.int64] | None = None) -> list[Array]:
-    """Averaged columns of the torque regressor, chunk by chunk; only the given ones if any."""
-    assert problem.robot is not None
-    robot = with_whole_turns(problem.robot)
-    index = np.arange(10 * robot.n_bodies) if index is None else index
-    rows = [np.zeros((count, len(index))) for count in problem.rows.counts]
-    s, weights = problem.sampled(problem.rows.step)
-    in_time = [RowsInTime.of(own) for own in weights]
-    for chunk, regressor in robot.iter_torque_regressor(s.q, s.dq, s.ddq):
-        for j, block in enumerate(rows):
-            here, shares = in_time[j].within(chunk)
-            block[here] += shares @ regressor[j][index].T
-        tell("Computing the rigid body", chunk.stop / len(s.q))
+def regressor_rows(problems: Sequence[Problem], index: NDArray[np.int64]) -> list[list[Array]]:
+    """Averaged columns of the torque regressor of one robot, by problem and joint.
+
+    The regressor is computed chunk by chunk; short recordings share one.
+    """
+    assert problems[0].robot is not None
+    robot, columns = with_whole_turns(problems[0].robot), tuple(index.tolist())
+    rows = [[np.zeros((n, len(columns))) for n in problem.rows.counts] for problem in problems]
+    sampled = [problem.sampled(problem.rows.step) for problem in problems]
+    in_time = [[RowsInTime.of(own) for own in weights] for _, weights in sampled]
+    motion = {k: joined([getattr(s, k) for s, _ in sampled]) for k in ("q", "dq", "ddq")}
+    starts = np.cumsum([0, *(s.n_samples for s, _ in sampled)]).tolist()
+    first = first_columns(robot, columns)
+    for chunk, regressor in robot._engine.iter_regressor_columns(motion, columns, 0, CHUNK):
+        for k, samples, part in _in_chunk(chunk, starts):
+            for j, block in enumerate(rows[k]):
+                here, shares = in_time[k][j].within(samples)
+                block[here, first[j] :] += shares @ regressor[j, first[j] :, part].T
+        tell("Computing the rigid body", chunk.stop / starts[-1])
     return rows
+
+
+def _in_chunk(chunk: slice, starts: Sequence[int]) -> Iterator[tuple[int, slice, slice]]:
+    """Recordings with samples in a chunk, these samples, and their places in the chunk."""
+    for k, (start, stop) in enumerate(pairwise(starts)):
+        a, b = max(start, chunk.start), min(stop, chunk.stop)
+        if a < b:
+            yield k, slice(a - start, b - start), slice(a - chunk.start, b - chunk.start)
+
+
+@lru_cache(maxsize=64)
+def first_columns(robot: Robot, columns: tuple[int, ...]) -> list[int]:
+    """The first of some columns of the regressor that does not vanish, by joint.
+
+    A joint moves none of the bodies before it.
+    """
+    used = robot._engine.program("torque_regressor", robot._engine.gravity_key()).outputs
+    return [
+        min((i for i, c in enumerate(columns) if (j, c) in used), default=len(columns))
+        for j in range(robot.n_joints)
+    ]
 
 
 def independent_columns(rows: Array) -> NDArray[np.int64]:

@@ -189,15 +189,15 @@ class RowsInTime:
 
     Attributes
     ----------
-    order : ndarray of shape (n_rows,) of int
-        The rows in the order of their first samples.
+    order : ndarray of shape (n_rows,) of int, or None
+        The rows in the order of their first samples; None if they are in this order already.
     first, last : ndarray of shape (n_rows,) of int
         First and last sample of each row.
     weights : csr_matrix of shape (n_rows, n_samples)
         Sorted alike.
     """
 
-    order: NDArray[np.int64]
+    order: NDArray[np.int64] | None
     first: NDArray[np.int64]
     last: NDArray[np.int64]
     weights: csr_matrix
@@ -206,15 +206,20 @@ class RowsInTime:
     def of(cls, weights: csr_matrix) -> RowsInTime:
         """Sort rows whose samples are sorted."""
         first = weights.indices[weights.indptr[:-1]]
-        order = np.argsort(first, kind="stable")
         last = weights.indices[weights.indptr[1:] - 1]
+        if np.all(first[1:] >= first[:-1]):
+            return cls(None, first, last, weights)
+        order = np.argsort(first, kind="stable")
         return cls(order, first[order], last[order], weights[order])
 
-    def within(self, samples: slice) -> tuple[NDArray[np.int64], csr_matrix]:
+    def within(self, samples: slice) -> tuple[NDArray[np.int64] | slice, csr_matrix]:
         """Rows with samples in an interval, and their weights on these."""
-        start = int(np.searchsorted(self.last, samples.start))
-        stop = int(np.searchsorted(self.first, samples.stop))
-        return self.order[start:stop], self.weights[start:stop, samples]
+        rows, weights = slice(None), self.weights
+        if samples.stop - samples.start < weights.shape[1]:
+            start = int(np.searchsorted(self.last, samples.start))
+            rows = slice(start, int(np.searchsorted(self.first, samples.stop)))
+            weights = weights[rows, samples]
+        return rows if self.order is None else self.order[rows], weights
 
 
 def _scaled(weights: csr_matrix, factor: Array) -> csr_matrix:
@@ -268,15 +273,16 @@ def sliding_samples(
     ndarray of shape (n_samples, n_joints) of bool
     """
     margins = np.broadcast_to(margin, signals.n_joints)
-    sliding = np.zeros(signals.q.shape, dtype=bool)
+    sliding = valid.copy()
     for rows in signals.segments:
-        for joint in range(signals.n_joints):
-            velocity = signals.dq[rows, joint]
-            still = np.abs(velocity) <= REST * signals.unit[joint]
-            turns = np.flatnonzero(np.diff(np.sign(velocity)))
-            still[turns] = True
-            still[np.minimum(turns + 1, len(still) - 1)] = True
-            sliding[rows, joint] = ~widened(still, int(margins[joint])) & valid[rows, joint]
+        velocity = signals.dq[rows]
+        still = np.abs(velocity) <= REST * signals.unit
+        turns = np.diff(np.sign(velocity), axis=0) != 0
+        still[:-1] |= turns
+        still[1:] |= turns
+        for reach in set(margins.tolist()):
+            own = np.flatnonzero(margins == reach)
+            sliding[rows, own] &= ~widened(still[:, own], reach)
     return sliding
 
 
@@ -351,11 +357,14 @@ def interpolation(segments: Sequence[slice], few: Sequence[slice], step: int) ->
 
 def widened(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
     """A mask extended along its first axis by some samples on each side."""
-    total = np.zeros((len(mask) + 1, *mask.shape[1:]), dtype=np.int64)
-    np.cumsum(mask, axis=0, out=total[1:])
-    place = np.arange(len(mask))
-    before, after = np.maximum(place - reach, 0), np.minimum(place + reach + 1, len(mask))
-    return np.asarray(total[after] > total[before])
+    wide = np.zeros((len(mask) + 2 * reach, *mask.shape[1:]), dtype=bool)
+    wide[reach : reach + len(mask)] = mask
+    width, whole = 1, 2 * reach + 1
+    while width < whole:  # every sample shows those from it on, twice as many each time
+        step = min(width, whole - width)
+        wide[:-step] |= wide[step:]
+        width += step
+    return wide[: len(mask)]
 
 
 def window_rows(
@@ -375,19 +384,19 @@ def window_rows(
         As in :class:`Rows`.
     """
     spans = [_windows(signals.clock[rows], rows.start, window) for rows in signals.segments]
+    counts = [len(span.middle) for span in spans]
+    middle = np.concatenate([span.middle for span in spans])
+    name = np.repeat(signals.trajectory[[rows.start for rows in signals.segments]], counts)
+    eighth = np.concatenate([np.arange(n) * 8 // max(1, n) % 4 for n in counts])
     weights, trajectory, time, quarter = [], [], [], []
     for joint in range(signals.n_joints):
-        parts = [_weigh(span, use[:, joint]) for span in spans]
+        own = np.ascontiguousarray(use[:, joint])
+        parts = [_weigh(span, own) for span in spans]
         weights.append(_stack([part[0] for part in parts], signals.n_samples))
-        keep = [part[1] for part in parts]
-        labels = [
-            np.full(int(k.sum()), signals.trajectory[rows.start])
-            for k, rows in zip(keep, signals.segments, strict=True)
-        ]
-        trajectory.append(np.concatenate(labels))
-        time.append(np.concatenate([s.middle[k] for s, k in zip(spans, keep, strict=True)]))
-        eighths = [(np.arange(len(k)) * 8 // max(1, len(k)) % 4)[k] for k in keep]
-        quarter.append(np.concatenate(eighths))
+        keep = np.concatenate([part[1] for part in parts])
+        trajectory.append(name[keep])
+        time.append(middle[keep])
+        quarter.append(eighth[keep])
     return Rows(weights, trajectory, time, quarter, use, step)
 
 
@@ -397,15 +406,16 @@ class _Windows:
 
     middle: Array
     row: NDArray[np.int64]
-    sample: NDArray[np.int64]
+    sample: NDArray[np.int32]  # the type of indices that SciPy chooses, so that it copies none
     weight: Array
     full: Array  # weight of every window, (n_windows,)
 
 
 def _windows(time: Array, offset: int, window: float) -> _Windows:
     steps = np.diff(time)
-    forward = steps[steps > 0]
-    width = max(window, FEWEST_SAMPLES * np.median(forward)) if len(forward) else window
+    width = window
+    if FEWEST_SAMPLES * steps.max(initial=0.0) > window:
+        width = max(window, FEWEST_SAMPLES * np.median(steps[steps > 0]))
     middle = np.arange(time[0] + width / 2, time[-1] - width / 2 + 1e-9, width / 2)
     first = np.searchsorted(time, middle - width / 2)
     last = np.searchsorted(time, middle + width / 2)
@@ -415,30 +425,30 @@ def _windows(time: Array, offset: int, window: float) -> _Windows:
     sample = np.repeat(first, length) + within
     weight = np.cos(np.pi * (time[sample] - middle[row]) / width) ** 2
     full: Array = np.bincount(row, weight, minlength=len(middle)).astype(float)
-    return _Windows(middle, row, sample + offset, weight, full)
+    return _Windows(middle, row, (sample + offset).astype(np.int32), weight, full)
 
 
-Entries = tuple[NDArray[np.int64], NDArray[np.int64], Array, int]
+#: Number of samples of every kept window, and the samples and weights of one window after another.
+Entries = tuple[NDArray[np.int64], NDArray[np.int32], Array]
 
 
 def _weigh(span: _Windows, use: NDArray[np.bool_]) -> tuple[Entries, NDArray[np.bool_]]:
     """Weights of the samples in use, scaled to unit noise gain, and a mask of the kept windows."""
     n = len(span.middle)
-    kept = use[span.sample]
-    row, sample, weight = span.row[kept], span.sample[kept], span.weight[kept]
-    total = np.bincount(row, weight, minlength=n)
+    used = use.take(span.sample)
+    weight = span.weight * used
+    total = np.bincount(span.row, weight, n)
     keep = (total > 0) & (total >= LEAST_WEIGHT * span.full)
-    gain = np.sqrt(np.bincount(row, weight**2, minlength=n))
-    inside = keep[row]
-    number = np.cumsum(keep) - 1
-    row, sample = row[inside], sample[inside]
-    return (number[row], sample, weight[inside] / gain[row], int(keep.sum())), keep
+    gain = np.sqrt(np.bincount(span.row, weight**2, n))
+    inside = np.flatnonzero(used & keep[span.row])
+    row = span.row[inside]
+    length = np.bincount(row, minlength=n)[keep]
+    return (length, span.sample[inside], weight[inside] / gain[row]), keep
 
 
 def _stack(parts: list[Entries], n_samples: int) -> csr_matrix:
     """Rows of all segments; entries are sorted by row and by sample already."""
-    lengths = [np.bincount(part[0], minlength=part[3]) for part in parts]
-    start = np.cumsum(np.concatenate([[0], *lengths]))
-    sample = np.concatenate([part[1] for part in parts])
-    value = np.concatenate([part[2] for part in parts])
-    return scipy.sparse.csr_matrix((value, sample, start), shape=(len(start) - 1, n_samples))
+    lengths, samples, values = zip(*parts, strict=True)
+    start = np.concatenate([[0], *lengths]).cumsum(dtype=np.int32)
+    found = np.concatenate(values), np.concatenate(samples), start
+    return scipy.sparse.csr_matrix(found, shape=(len(start) - 1, n_samples))

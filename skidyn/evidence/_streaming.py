@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Evidence of data sets larger than memory: one trajectory at a time, on one machine or many."""
+"""Evidence of data sets larger than memory: few trajectories at a time, on one machine or many."""
 
 from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial, reduce
 from pathlib import Path
@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 from skidyn._exceptions import LogError, SkidynError
-from skidyn._signals import Array, Signals
+from skidyn._signals import Array, Signals, joined
 from skidyn.effects import Term, TermSum, make_terms
-from skidyn.evidence._evidence import Evidence, column_names
+from skidyn.evidence._evidence import Evidence, column_names, rows_of_problem
 from skidyn.evidence._motion_rows import motion_rows, read_motion
 from skidyn.evidence._parquet import ColumnMap, read_trajectories
-from skidyn.evidence._problem import Problem, hysteresis_joints
+from skidyn.evidence._problem import Problem, hysteresis_joints, with_rigid_columns
+from skidyn.evidence._rigid_rows import CHUNK
 from skidyn.robots import Robot, base_parameter_index
 
 PathLike = str | os.PathLike[str]
@@ -27,6 +28,8 @@ PathLike = str | os.PathLike[str]
 TASKS_PER_THREAD = 8
 
 
+#: Motion and torque of a trajectory.
+Recording = tuple[Signals, Array]
 #: A file, and the trajectories in it, counted from 0, that are left out.
 Source = tuple[Path, frozenset[int]]
 
@@ -59,7 +62,7 @@ def evidence_from_parquet(
     n_jobs: int | None = None,
     client: Any = None,
 ) -> Evidence:
-    """Evidence of Parquet files, with at most one trajectory in memory.
+    """Evidence of Parquet files, with one trajectory in memory, or some short ones.
 
     Parameters
     ----------
@@ -198,22 +201,43 @@ def evidence_of_signals(
         By trajectory and joint.
     """
     terms = tuple(terms)
-    motion = read_motion(signals, smooth, torque)
-    rows = motion_rows(motion, hysteresis_joints(terms))
-    problem = Problem(
-        robot=robot,
-        signals=motion.with_(robot=robot),
-        torque=torque - robot.inverse_dynamics(motion.q, motion.dq, motion.ddq),
-        terms=TermSum(terms),
-        rows=rows,
-        fold=[np.zeros(n, dtype=np.int64) for n in rows.counts],
-        n_folds=1,
-        whole_trajectories=True,
-        rigid_body=rigid_body,
-        rigid_rows=[np.zeros((n, 0)) for n in rows.counts],
-    )
+    (problem,) = _problems([(signals, torque)], robot, terms, rigid_body, smooth)
+    return Evidence.from_problem(problem, terms)
+
+
+def _problems(
+    recordings: Sequence[Recording],
+    robot: Robot,
+    terms: Sequence[Term],
+    rigid_body: bool = True,
+    smooth: bool = True,
+) -> list[Problem]:
+    """Averaged rows of recordings, and if wanted the columns of all base parameters.
+
+    The programs of the rigid body take less time for many samples than for few at a time.
+    """
+    motions = [read_motion(signals, smooth, torque) for signals, torque in recordings]
+    together = (joined([getattr(motion, k) for motion in motions]) for k in ("q", "dq", "ddq"))
+    ends = np.cumsum([motion.n_samples for motion in motions])[:-1]
+    models = np.split(robot.inverse_dynamics(*together), ends)
+    problems = []
+    for motion, (_, torque), model in zip(motions, recordings, models, strict=True):
+        rows = motion_rows(motion, hysteresis_joints(terms))
+        problem = Problem(
+            robot=robot,
+            signals=motion.with_(robot=robot),
+            torque=torque - model,
+            terms=TermSum(terms),
+            rows=rows,
+            fold=[np.zeros(n, dtype=np.int64) for n in rows.counts],
+            n_folds=1,
+            whole_trajectories=True,
+            rigid_body=rigid_body,
+            rigid_rows=[np.zeros((n, 0)) for n in rows.counts],
+        )
+        problems.append(problem)
     # All trajectories have the same columns, also those in which few joints move.
-    return Evidence.from_problem(problem.with_base_columns(), terms)
+    return with_rigid_columns(problems, base_parameter_index(robot)) if rigid_body else problems
 
 
 def linear_terms(effects: Iterable[Any], n_joints: int) -> list[Term]:
@@ -263,16 +287,36 @@ def _of_files(
     sources: Sequence[Source], robot: Robot, terms: Sequence[Term], options: Options
 ) -> _Part:
     """Evidence of files, their trajectories numbered from 0."""
-    parts = (
-        _Part(evidence_of_signals(signals, torque, robot, terms), 1)
-        for path, left_out in sources
-        for k, (signals, torque) in enumerate(
-            read_trajectories(path, robot, columns=options.columns, max_rows=options.max_rows)
-        )
-        if k not in left_out
-    )
-    nothing = _Part(Evidence(column_names(robot, base_parameter_index(robot), terms), {}, {}), 0)
-    return reduce(partial(_joined, groups=options.groups), parts, nothing)
+    evidence = Evidence(column_names(robot, base_parameter_index(robot), terms), {}, {})
+    n = 0
+    for together in _together(_recordings(sources, robot, options)):
+        for problem in _problems(together, robot, terms):
+            name = n if options.groups is None else n % options.groups
+            rows = rows_of_problem(problem, terms).items()
+            evidence = evidence.with_rows({(name, joint): block for (_, joint), block in rows})
+            n += 1
+    return _Part(evidence, n)
+
+
+def _recordings(sources: Sequence[Source], robot: Robot, options: Options) -> Iterator[Recording]:
+    """Trajectories of files that are not left out, in their order."""
+    for path, left_out in sources:
+        found = read_trajectories(path, robot, columns=options.columns, max_rows=options.max_rows)
+        yield from (recording for k, recording in enumerate(found) if k not in left_out)
+
+
+def _together(recordings: Iterable[Recording]) -> Iterator[list[Recording]]:
+    """Neighbouring recordings, as many as share a chunk of the regressor, but at least one."""
+    found: list[Recording] = []
+    for recording in recordings:
+        found.append(recording)
+        # The next one is as long, in most files; to look at it would take memory.
+        lengths = [signals.n_samples for signals, _ in found]
+        if sum(lengths) + lengths[-1] > CHUNK:
+            yield found
+            found = []
+    if found:
+        yield found
 
 
 def _joined(one: _Part, other: _Part, groups: int | None) -> _Part:

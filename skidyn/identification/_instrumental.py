@@ -77,7 +77,7 @@ def instrument_rows(problem: Problem, fit: Fit, signals: Signals, smooth: bool) 
     moved = motion.with_(robot=problem.robot)
     other = replace(problem, signals=moved, _cache={})
     other.set_fit(fit)
-    other.rigid_rows = regressor_rows(other, problem.rigid_index)
+    (other.rigid_rows,) = regressor_rows([other], problem.rigid_index)
     return other.design([other.term_rows(t) for t in fit.terms])
 
 

@@ -103,6 +103,23 @@ def test_trajectories_of_two_files_never_share_a_factor(tmp_path, folder):
         same(evidence_from_parquet(tmp_path, ROBOT, groups=groups, n_jobs=2), wanted)
 
 
+def test_what_trajectories_are_read_together_makes_no_difference(tmp_path):
+    """Short ones share the computation of the regressor; a long one takes several parts of it."""
+    log = make_hidden_effect_log(ROBOT, None, n_trajectories=3, duration=20.0, random_state=3)
+    whole = log.frame[log.frame["trajectory"] == 1]
+    step = whole["time"].diff().median()
+    long = pd.concat([whole, *(whole.assign(time=whole["time"] + 20.0 * k) for k in (1, 2))])
+    long["time"] = np.arange(len(long)) * step
+    short = [log.frame[log.frame["trajectory"] == k][:n] for k, n in ((2, 900), (3, 1400))]
+    assert len(long) > 4000
+    files = [tmp_path / f"{k}.parquet" for k in range(4)]
+    for file, frame in zip(files, [short[0], short[1], long, short[0]], strict=True):
+        frame.to_parquet(file)
+    together = evidence_from_parquet(files, ROBOT, groups=None)
+    alone = [evidence_from_parquet(file, ROBOT, groups=None) for file in files]
+    same(together, sum((e.shifted(k) for k, e in enumerate(alone[1:], 1)), alone[0]))
+
+
 def test_a_killed_worker_of_loky_is_a_clear_error(folder):
     """Other than on a cluster nothing runs again; nothing is added up without it either."""
     files = sorted(folder.glob("*.parquet")) * 2
