@@ -159,7 +159,10 @@ def conclude(
             joints = [j + 1 for j in candidate.joints]
             own = [u for u in unknowns if hypothesis.kind == UNKNOWN and u.joint in joints]
             q = false_discovery_rate(chance, hypothesis.tried)
-            finding = make_finding(problem, hypothesis, candidate, q, drop, intervals, own)
+            averaged = drop_of(averages[i], averages[i + 1], tuple(candidate.rows))
+            finding = make_finding(
+                problem, hypothesis, candidate, q, drop, averaged, intervals, own
+            )
             finding.when.extend(acting(problem, candidate.term, own_torque))
             curves = effect_curves(problem, finding.terms, own_torque, residual)
             finding.curves.extend(curves)

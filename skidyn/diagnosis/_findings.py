@@ -20,6 +20,7 @@ from skidyn.diagnosis._hypothesis import (
     removed_share,
     rivals_among,
 )
+from skidyn.diagnosis._rule import LITTLE
 from skidyn.diagnosis._unknown import UnknownTorque
 from skidyn.effects import NamelessEffect, Term, get_effect
 from skidyn.evidence import Problem
@@ -94,6 +95,9 @@ class Finding:
         less than half.
     lead : float
         The margin as twice a log-likelihood.
+    averaged_drop : float or None
+        As ``error_drop``, of the torque averaged over windows of motion, without the noise that is
+        faster than these.
 
     Examples
     --------
@@ -125,6 +129,7 @@ class Finding:
     instead: str | None = None
     nearest: dict[str, Any] | None = None
     lead: float = np.inf
+    averaged_drop: float | None = None
 
     def _repr_html_(self) -> str:
         from skidyn.diagnosis._notebook import finding_card
@@ -145,6 +150,7 @@ class Finding:
             "parameters": self.parameters,
             "variables": list(self.variables),
             "error_drop": self.error_drop,
+            "averaged_drop": self.averaged_drop,
             "q_value": self.q_value,
             "rivals": list(self.rivals),
             "separating_motion": self.separating_motion,
@@ -206,6 +212,7 @@ def make_finding(
     candidate: Candidate,
     q_value: float,
     error_drop: float,
+    averaged_drop: float,
     intervals: dict[Term, dict[str, Any]],
     unknowns: Sequence[UnknownTorque] = (),
 ) -> Finding:
@@ -219,8 +226,8 @@ def make_finding(
         The added hypothesis.
     candidate : Candidate
         One of its terms.
-    q_value, error_drop : float
-        Significance and share of the squared error removed.
+    q_value, error_drop, averaged_drop : float
+        Significance, and share of the squared error of samples and of averaged rows removed.
     intervals : dict
         Parameters of every term with their intervals.
     unknowns : sequence of UnknownTorque, default=()
@@ -254,7 +261,7 @@ def make_finding(
     sentence = f"{told_briefly(title, joints, some, parameters)}. "
     sentence += f"It {spans_told(term.spans)}. " if term.spans else ""
     sentence += f"It {course_told(term)}. " if term.course else ""
-    sentence += _fall_told(error_drop)
+    sentence += _fall_told(error_drop, averaged_drop)
     if rivals:
         sentence += (
             f" This data cannot separate it from {listed([rival_title(k) for k in rivals], 'or')}"
@@ -295,6 +302,7 @@ def make_finding(
         elsewhere=elsewhere,
         nearest=nearest,
         lead=compared.margin * compared.score,
+        averaged_drop=averaged_drop,
     )
 
 
@@ -389,11 +397,16 @@ def course_told(term: Term) -> str:
     return f"falls steadily {over}, from the stated size to {last:.0%} of it"
 
 
-def _fall_told(drop: float) -> str:
-    share = f"{drop:.0%}" if drop >= 0.005 else f"{drop:.1%}"
+def _fall_told(drop: float, averaged: float) -> str:
     if drop <= 0:
         return "Refitting the model with it does not reduce the error on held-out data."
-    return f"Adding it removes {share} of the held-out squared error."
+    if drop >= LITTLE or averaged < LITTLE:
+        share = f"{drop:.0%}" if drop >= LITTLE else f"{drop:.1%}"
+        return f"Adding it removes {share} of the held-out squared error."
+    return (
+        f"Adding it removes {averaged:.0%} of the held-out squared error of the torque averaged over "
+        f"windows, and {drop:.1%} of that of its samples, which mostly consists of fast noise."
+    )
 
 
 def _may_be_zero(row: dict[str, Any]) -> bool:

@@ -8,6 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from skidyn._text import joints_told
+from skidyn.diagnosis._rule import LITTLE
 from skidyn.diagnosis._story import sizes, sure
 
 if TYPE_CHECKING:
@@ -72,11 +73,13 @@ def finding_card(finding: Finding) -> str:
     str
         Every text is escaped.
     """
-    size = sizes(finding)
+    size, fast = sizes(finding), ""
+    if finding.averaged_drop is not None and finding.error_drop < LITTLE < finding.averaged_drop:
+        fast = f", and {finding.averaged_drop:.0%} of that of the torque averaged over windows"
     parts = [
         f"<b>{escape(finding.title)}</b> on {escape(joints_told(finding.joints))}"
         f"{': ' + escape(size) if size else ''}",
-        f"{escape(sure(finding))}; removes {finding.error_drop:.0%} of the squared error there",
+        f"{escape(sure(finding))}; removes {finding.error_drop:.0%} of the squared error there{fast}",
     ]
     if finding.rivals and finding.separating_motion:
         motion = escape(finding.separating_motion)

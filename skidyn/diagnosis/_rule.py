@@ -128,11 +128,12 @@ UNLIKELY = 0.02
 #: likely effect even with a lower confidence; what removes less has to be likely by itself, also if
 #: other explanations are equally good.
 MUCH = 0.1
-#: An effect that removes a smaller share of the error of samples is a finding only with this
-#: confidence: in generated logs, such effects with a lower confidence were wrong
-#: (``confidence.py``). The same for an unknown function, which noise of derivatives may cause; and
-#: for an effect that moves the link, whatever its confidence, since the smoothing of derivatives
-#: leaves torques like those of a soft joint (``nothing_hidden.py``).
+#: An effect that removes a smaller share of the error of samples and of averaged rows is a finding
+#: only with this confidence: in generated logs, such effects with a lower confidence were wrong
+#: (``confidence.py``). The same for an unknown function with this share of the error of samples,
+#: since noise of derivatives may cause it; and for an effect that moves the link, whatever its
+#: confidence, since the smoothing of derivatives leaves torques like those of a soft joint
+#: (``nothing_hidden.py``).
 LITTLE, SURE_OF_LITTLE, LITTLE_OF_DERIVATIVES = 0.005, 0.9, 0.02
 
 # Whether an effect is the same throughout the log (``_constancy.py``); ``confidence.py``.

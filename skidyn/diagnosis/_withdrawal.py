@@ -289,6 +289,8 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
         moves = any(term.effect.moves_link for term in finding.terms)
         little = LITTLE_OF_DERIVATIVES if moves or finding.kind == UNKNOWN else LITTLE
         little *= _share_of_samples(diagnosis.problem, finding.trajectories)
+        if drop > 0 and not (moves or finding.kind == UNKNOWN):
+            drop = max([drop, *(f.averaged_drop or 0.0 for f in of_kind)])
         if drop < little and (moves or likely < SURE_OF_LITTLE):
             return False
         return likely >= GUESS or finding.error_drop >= GUESS
