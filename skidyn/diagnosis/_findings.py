@@ -404,8 +404,8 @@ def _fall_told(drop: float, averaged: float) -> str:
         share = f"{drop:.0%}" if drop >= LITTLE else f"{drop:.1%}"
         return f"Adding it removes {share} of the held-out squared error."
     return (
-        f"Adding it removes {averaged:.0%} of the held-out squared error of the torque averaged over "
-        f"windows, and {drop:.1%} of that of its samples, which mostly consists of fast noise."
+        f"Adding it removes {averaged:.0%} of the held-out squared error of the torque averaged "
+        f"over windows, and {drop:.1%} of that of its samples, which mostly consists of fast noise."
     )
 
 

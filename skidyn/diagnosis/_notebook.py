@@ -79,7 +79,8 @@ def finding_card(finding: Finding) -> str:
     parts = [
         f"<b>{escape(finding.title)}</b> on {escape(joints_told(finding.joints))}"
         f"{': ' + escape(size) if size else ''}",
-        f"{escape(sure(finding))}; removes {finding.error_drop:.0%} of the squared error there{fast}",
+        f"{escape(sure(finding))}; "
+        f"removes {finding.error_drop:.0%} of the squared error there{fast}",
     ]
     if finding.rivals and finding.separating_motion:
         motion = escape(finding.separating_motion)
