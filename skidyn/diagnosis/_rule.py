@@ -136,6 +136,10 @@ MUCH = 0.1
 #: (``nothing_hidden.py``).
 LITTLE, SURE_OF_LITTLE, LITTLE_OF_DERIVATIVES = 0.005, 0.9, 0.02
 
+#: An effect that moves the link removes noise of coarse positions if it removes this multiple of
+#: the squared error above the noise (``nothing_hidden.py --bits 12``).
+NOISE_REMOVED = 2.0
+
 # Whether an effect is the same throughout the log (``_constancy.py``); ``confidence.py``.
 #: Level of all tests of a diagnosis together, number of parts of the recordings, and share of what
 #: an effect explains above which its change is material, as ``Settings.further_tolerance``: the

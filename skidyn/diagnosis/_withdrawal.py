@@ -38,6 +38,7 @@ from skidyn.diagnosis._rule import (
     LITTLE,
     LITTLE_OF_DERIVATIVES,
     MUCH,
+    NOISE_REMOVED,
     SURE_OF_LITTLE,
     UNLIKELY,
     false_discovery_rate,
@@ -101,7 +102,8 @@ def useless(
     these.
 
     Where the noise of positions exceeds that of the torque, it dominates the error of samples, and
-    changes with the inertia of the model: there the held-out error of averaged rows counts.
+    changes with the inertia of the model: there the held-out error of averaged rows counts. An
+    effect that lowers the error of samples there to less than this noise filters it.
     """
     sensor, position = noise
     coarse = position > np.nan_to_num(sensor)
@@ -116,11 +118,34 @@ def useless(
             if all(coarse[j] for j in joints):
                 absolute = squared = averaged
             share = _share_of_samples(problem, candidate.term.trajectories)
-            if (absolute + squared) / 2 < least * share or squared <= 0:
+            little = (absolute + squared) / 2 < least * share or squared <= 0
+            if little or _removes_noise(candidate, errors[k][1], errors[k + 1][1], noise):
                 terms.append(candidate)
         if terms:
             return result.findings[k], terms
     return None
+
+
+def _removes_noise(
+    candidate: Candidate,
+    before: Sequence[float],
+    after: Sequence[float],
+    noise: tuple[Array, Array],
+) -> bool:
+    """Whether an effect that moves the link removes little else than the noise of positions.
+
+    In a soft joint, accelerations are filtered together with their noise.
+    """
+    if not candidate.term.effect.moves_link:
+        return False
+    sensor, position = np.nan_to_num(noise[0]), noise[1]
+    removed = above = 0.0
+    for j in candidate.rows:
+        if position[j] > sensor[j]:
+            square = sensor[j] ** 2 + position[j] ** 2
+            removed += (before[j] ** 2 - after[j] ** 2) / square
+            above += max(0.0, before[j] ** 2 / square - 1)
+    return removed > NOISE_REMOVED * above
 
 
 def unsupported(problem: Problem, result: SearchResult, level: float) -> Withdrawal | None:
