@@ -88,9 +88,9 @@ def look_after_beginnings(
     times = float(np.sqrt(ratio[joints].max()))
     note = (
         f"The first {length:.1f} s of the recordings, at most half of each, are not judged: "
-        f"{where} swings there already when a recording begins, with up to {times:.1f} times the "
-        "error of later motion, which no logged signal predicts. Begin recordings at rest to use "
-        "them."
+        f"{where} {'swings' if len(joints) == 1 else 'swing'} there already when a recording "
+        f"begins, with up to {times:.1f} times the error of later motion, which no logged signal "
+        "predicts. Begin recordings at rest to use them."
     )
     return later, found, note
 

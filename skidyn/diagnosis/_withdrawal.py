@@ -136,16 +136,13 @@ def _removes_noise(
 
     In a soft joint, accelerations are filtered together with their noise.
     """
-    if not candidate.term.effect.moves_link:
+    joints = list(candidate.rows)
+    sensor, position = np.nan_to_num(noise[0])[joints], noise[1][joints]
+    if not (candidate.term.effect.moves_link and (position > sensor).any()):
         return False
-    sensor, position = np.nan_to_num(noise[0]), noise[1]
-    removed = above = 0.0
-    for j in candidate.rows:
-        if position[j] > sensor[j]:
-            square = sensor[j] ** 2 + position[j] ** 2
-            removed += (before[j] ** 2 - after[j] ** 2) / square
-            above += max(0.0, before[j] ** 2 / square - 1)
-    return removed > NOISE_REMOVED * above
+    square = np.maximum(sensor**2 + position**2, np.finfo(float).tiny)
+    had, has = (np.array(error)[joints] ** 2 / square for error in (before, after))
+    return bool(np.sum(had - has) > NOISE_REMOVED * np.sum(np.maximum(had - 1, 0.0)))
 
 
 def unsupported(problem: Problem, result: SearchResult, level: float) -> Withdrawal | None:
