@@ -424,8 +424,8 @@ class RankingSearch(RecordingSearch):
         refined = self.settings.refined if refined is None else refined
         _ = self.errors_now(), self.tester(self.chosen)  # before processes that would all find them
         text = f"{self._round}: refining the best"
-        found = each(lambda own: self._final(own, True), rough[:refined], text)
-        found += [self._final(own, False) for own in rough[refined:]]
+        tasks = [(own, k < refined) for k, own in enumerate(rough)]
+        found = each(lambda task: self._final(*task), tasks, text, short=not refined)
         return [h for h in found if h is not None and h.score > self.settings.least_gain]
 
     def _final(self, candidates: list[Candidate], refined: bool) -> Hypothesis | None:
