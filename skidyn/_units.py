@@ -93,7 +93,7 @@ def refuse_stated_units(
 
 
 def convert_units(frame: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame:
-    """Convert columns of a log to SI; the result is a copy.
+    """Convert columns of a log to SI; the given table is not changed.
 
     Units are those of a quantity (``{"q": "deg", "time": "ms"}``) or of one column (``{"q3":
     "mm"}``), which has priority. A LogError is raised if a quantity or unit is unknown, or the log
@@ -103,7 +103,7 @@ def convert_units(frame: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame
     >>> convert_units(pd.DataFrame({"q1": [180.0]}), {"q": "deg"}).q1.round(4).tolist()
     [3.1416]
     """
-    frame = frame.copy()
+    frame = frame.copy(deep=False)  # whole columns are replaced
     for target, unit in units.items():
         quantity = re.sub(r"\d+$", "", target)
         if quantity not in FACTORS:

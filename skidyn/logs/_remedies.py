@@ -61,7 +61,7 @@ def mend_columns(
     is zero or not finite, a position includes itself, or there are no commanded positions for the
     sign.
     """
-    table = table.copy()
+    table = table.copy(deep=False)  # whole columns are replaced
     if remedies.order is not None:
         _reorder(table, n, remedies.order, notes)
     if remedies.torque_sign not in ("recorded", "command"):
