@@ -118,18 +118,6 @@ def _beginnings(problem: Problem, length: float) -> NDArray[np.bool_]:
     return early
 
 
-def swings(result: SearchResult) -> bool:
-    """Whether a link that swings is among the findings.
-
-    Parameters
-    ----------
-    result : SearchResult
-        Findings.
-    """
-    terms = [c.term for h in result.findings for c in h.candidates]
-    return any(term.effect.fastest(term.shape) for term in terms)
-
-
 def _slowest_swing(searched: Searched) -> float:
     """Lowest resonance of the links that were found to swing, Hz; 0 without one."""
     first, _, last = searched

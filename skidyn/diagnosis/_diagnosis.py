@@ -19,7 +19,7 @@ from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning
 from skidyn._memory import give_back
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
-from skidyn.diagnosis._beginnings import look_after_beginnings, swings
+from skidyn.diagnosis._beginnings import look_after_beginnings
 from skidyn.diagnosis._blocks import block_length, time_blocks, variance_inflation
 from skidyn.diagnosis._conclusion import conclude
 from skidyn.diagnosis._confidence import in_doubt
@@ -313,21 +313,15 @@ def _diagnose(
         if not alone():
             problem = posed()  # without data of the previous search
         found = _search(problem, kinds, settings, vibration=steady)
-    settled = look_after_beginnings(
+    problem, (result, wider, completed), left_out = look_after_beginnings(
         problem, found, kinds, lambda later: _search(later, kinds, settings, vibration=steady)
     )
+    notes += [left_out] if left_out else []
+    limits = _limits(problem, result, completed, settings)
+    give_back()
+    sliding = problem.rows.sliding
     data = (X, tau) if weight is None else (X, tau, weight)
-    # the beginnings count if the link that swings there is withdrawn
-    for own, (result, wider, completed), left_out in (settled, (problem, found, "")):
-        limits = _limits(own, result, completed, settings)
-        give_back()
-        remarks = [*notes, left_out] if left_out else notes
-        sliding = own.rows.sliding
-        diagnosis = conclude(
-            wider, completed, limits, sliding, judged, remarks, settings, model, data
-        )
-        if not left_out or swings(diagnosis.result):
-            break
+    diagnosis = conclude(wider, completed, limits, sliding, judged, notes, settings, model, data)
     diagnosis.checks = checks
     diagnosis.findings = [_beside_doubts(f, checks) for f in diagnosis.findings]
     kept = {c.site for h in diagnosis.result.findings for c in h.candidates}
