@@ -1,5 +1,6 @@
 """Work on several cores: the same results in the same order, errors, processes that die."""
 
+import multiprocessing
 import os
 import signal
 import sys
@@ -131,3 +132,13 @@ def test_a_system_that_gives_no_further_process_is_enough(monkeypatch):
 def test_no_processes_at_all_is_refused():
     with pytest.raises(ValueError, match="n_jobs=0"), cores(0):
         pass
+
+
+@pytest.mark.parametrize("short", [False, True])
+def test_no_process_is_left_behind(short):
+    with cores(2):
+        assert each(lambda k: np.full(1000, k).sum(), range(8), short=short) == [
+            1000 * k for k in range(8)
+        ]
+
+    assert not multiprocessing.active_children()

@@ -50,6 +50,35 @@ def test_hum_that_is_smaller_than_the_noise_is_a_remark_and_no_finding(share, is
     assert diagnosis.verdict == ("unknown" if is_named else "complete")
 
 
+def test_an_effect_beneath_fast_noise_is_judged_by_averaged_torque():
+    log = {
+        kind: make_hidden_effect_log(
+            load_planar_arm(),
+            kind,
+            joints=[1],
+            n_trajectories=8,
+            duration=10.0,
+            rate=500.0,
+            random_state=3,
+        )
+        for kind in ("torque_ripple", None)
+    }
+    torque = np.array(log["torque_ripple"].y)
+    size = np.std(torque[:, 0] - log[None].y[:, 0])
+    torque[:, 0] += 14 * size * np.random.default_rng(0).normal(size=len(torque))
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        diagnosis = diagnose(RBDRegressor(log[None].robot), log[None].X, torque)
+
+    (finding,) = diagnosis.findings
+    assert (finding.kind, finding.joints) == ("torque_ripple", (1,))
+    assert finding.error_drop < 0.005
+    assert finding.averaged_drop == pytest.approx(0.12, abs=0.02)
+    assert "averaged over windows" in finding.sentence
+    assert finding.to_dict()["averaged_drop"] == finding.averaged_drop
+
+
 @pytest.mark.slow
 def test_what_was_significant_beside_a_withdrawn_function_only_is_not_named(arm_log, found_in):
     """A function of the noisy accelerations of coarse encoders does not predict samples better."""
