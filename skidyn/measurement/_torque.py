@@ -29,6 +29,8 @@ CUT = 0.05
 #: bodies oppose it by this multiple of their spread, share of rows in which a torque that has the
 #: sign of the velocity does not, and its least correlation with these bodies there.
 SLOW, FEWEST_AGAINST, STRONGLY, ALWAYS, GROWS = 0.1, 50, 0.5, 0.98, 0.5
+#: Least mean torque of these bodies there, as a share of the mean magnitude of the torque.
+MATERIAL = 0.5
 #: Log-likelihood that the magnitude must gain over the torque itself, and to be sure.
 LEAST, SURE = 15.0, 40.0
 
@@ -173,6 +175,8 @@ def signed_by_velocity(measurement: Measurement) -> list[int]:
         if against.sum() < FEWEST_AGAINST:
             continue
         size, opposing = np.abs(measurement.torque[against, k]), -own[against]
+        if np.mean(opposing) < MATERIAL * np.mean(size):
+            continue  # that of friction, whatever the bodies do
         if np.ptp(size) and np.ptp(opposing) and np.corrcoef(size, opposing)[0, 1] > GROWS:
             found.append(k)
     return found
