@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from skidyn.datasets import load_scara, make_hidden_effect_log
+from skidyn.datasets import load_scara, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
 
 
@@ -33,3 +33,9 @@ def test_a_magnitude_with_the_sign_of_the_velocity(signals, torque, found):
     assert told_of(torque) == []
     # bodies never oppose the motion of joint 2 by much
     assert told_of(np.abs(torque) * np.sign(signals.dq)) == [("suspected", (1,))]
+
+
+def test_friction_of_a_wrist_with_light_links_is_no_magnitude():
+    robot = load_ur5()
+    log = make_hidden_effect_log(robot, None, n_trajectories=4, duration=4.0)
+    assert not [s for s in check_log(log.frame, robot).checks if s.check == "unsigned_torque"]
