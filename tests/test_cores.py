@@ -136,9 +136,11 @@ def test_no_processes_at_all_is_refused():
 
 @pytest.mark.parametrize("short", [False, True])
 def test_no_process_is_left_behind(short):
+    before = set(multiprocessing.active_children())  # of other libraries
+
     with cores(2):
         assert each(lambda k: np.full(1000, k).sum(), range(8), short=short) == [
             1000 * k for k in range(8)
         ]
 
-    assert not multiprocessing.active_children()
+    assert set(multiprocessing.active_children()) <= before
