@@ -397,10 +397,21 @@ def course_told(term: Term) -> str:
     return f"falls steadily {over}, from the stated size to {last:.0%} of it"
 
 
+def beneath_fast_noise(error_drop: float, averaged_drop: float | None) -> bool:
+    """Whether next to nothing of the error of samples is removed, but some of that of averages.
+
+    Parameters
+    ----------
+    error_drop, averaged_drop : float
+        As in :class:`Finding`.
+    """
+    return averaged_drop is not None and error_drop < LITTLE <= averaged_drop
+
+
 def _fall_told(drop: float, averaged: float) -> str:
     if drop <= 0:
         return "Refitting the model with it does not reduce the error on held-out data."
-    if drop >= LITTLE or averaged < LITTLE:
+    if not beneath_fast_noise(drop, averaged):
         share = f"{drop:.0%}" if drop >= LITTLE else f"{drop:.1%}"
         return f"Adding it removes {share} of the held-out squared error."
     return (

@@ -5,14 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from skidyn._text import joints_told
-from skidyn.diagnosis._rule import LITTLE
+from skidyn.diagnosis._findings import Finding, beneath_fast_noise
 from skidyn.diagnosis._story import sizes, sure
-
-if TYPE_CHECKING:
-    from skidyn.diagnosis._findings import Finding
 
 BEFORE, AFTER, NOISE = "#c44e00", "#0072b2", "currentColor"
 
@@ -74,7 +71,7 @@ def finding_card(finding: Finding) -> str:
         Every text is escaped.
     """
     size, fast = sizes(finding), ""
-    if finding.averaged_drop is not None and finding.error_drop < LITTLE < finding.averaged_drop:
+    if beneath_fast_noise(finding.error_drop, finding.averaged_drop):
         fast = f", and {finding.averaged_drop:.0%} of that of the torque averaged over windows"
     parts = [
         f"<b>{escape(finding.title)}</b> on {escape(joints_told(finding.joints))}"

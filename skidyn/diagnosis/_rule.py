@@ -137,7 +137,7 @@ MUCH = 0.1
 LITTLE, SURE_OF_LITTLE, LITTLE_OF_DERIVATIVES = 0.005, 0.9, 0.02
 
 #: An effect that moves the link removes noise of coarse positions if it removes this multiple of
-#: the squared error above the noise (``nothing_hidden.py --bits 12``).
+#: the squared error above the noise. True ones remove about as much; no benchmark prints this.
 NOISE_REMOVED = 2.0
 
 # Whether an effect is the same throughout the log (``_constancy.py``); ``confidence.py``.
