@@ -42,8 +42,8 @@ _ASIDE: ContextVar[tuple[_Child[Any], ...]] = ContextVar("skidyn_aside", default
 _ENDED: ContextVar[list[ForkProcess]] = ContextVar("skidyn_ended")
 #: Most processes: more would not save the time that starting them takes.
 MOST_PROCESSES = 8
-#: Approximate time that starting and ending a process takes, s.
-STARTING = 0.02
+#: Approximate time that starting and ending a process takes, s, with the memory that it copies.
+STARTING = 0.03
 #: Number of task numbers that fit into a pipe; processes read them one after another.
 MOST_PIECES = 4096
 _NUMBER = struct.Struct("=I")
@@ -96,7 +96,8 @@ def each(
     A result is pickled if another process computed it, and side effects there are lost; items need
     not be picklable. ``text`` describes the task for progress reports. A process of :func:`aside`
     takes one of the cores until it has its result. With ``short`` items of a few milliseconds or
-    less, processes are started as soon as all items so far have taken as long as starting one.
+    less, processes are started only while the items left are expected to take twice as long as
+    starting one, by the time of those so far.
     """
     items = list(items)
     size = -(-len(items) // MOST_PIECES)
@@ -109,21 +110,22 @@ def each(
     os.close(filled)  # a process that finds the pipe empty is done
 
     children: list[_Child[dict[int, Result]]] = []
-    earliest = time.perf_counter() + (STARTING if short else 0.0)
+    begin = time.perf_counter()
 
-    def start() -> None:
+    def start(begun: int) -> None:
         """Start a process for every free core; one of :func:`aside` may end meanwhile."""
-        if time.perf_counter() < earliest:
+        spent = time.perf_counter() - begin
+        if short and (not begun or spent / begun * (len(pieces) - begun) <= 2 * STARTING):
             return
         free = count - sum(child.busy for child in _ASIDE.get())
         while 1 + len(children) < min(free, len(pieces)) and (child := _started(work)):
             children.append(child)
 
-    def work(before: Callable[[], None] = lambda: None) -> dict[int, Result]:
+    def work(before: Callable[[int], None] = lambda _: None) -> dict[int, Result]:
         done: dict[int, Result] = {}
         while number := os.read(left, _NUMBER.size):
-            before()
             (k,) = _NUMBER.unpack(number)
+            before(k)
             if text:
                 tell(text, k / len(pieces))
             done.update((i, function(items[i])) for i in pieces[k])

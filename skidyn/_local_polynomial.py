@@ -39,6 +39,11 @@ def local_polynomial(values: Array, width: int, order: int, step: float) -> tupl
     return tuple(results)
 
 
+def middle_weights(width: int, order: int) -> Array:
+    """Weights of a window for the value and two derivatives in its middle, (3, width)."""
+    return _weights(width, order)[0]
+
+
 @lru_cache(maxsize=64)
 def _weights(width: int, order: int) -> tuple[Array, Array, Array]:
     """Weights of the middle of a window, and of the places before and after it, for unit steps.

@@ -160,7 +160,7 @@ class Signals:
     half_width : int
         Half the width of the window in which the motion was smoothed, in samples; 0 as logged.
     cutoff : float
-        Cut-off of that smoother, Hz; infinite as logged.
+        Cut-off of that smoother, Hz; infinite where none has been chosen.
     """
 
     q: Array

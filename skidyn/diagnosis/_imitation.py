@@ -74,7 +74,7 @@ def imitate(problem: Problem, fit: Fit) -> Problem:
     torque = along.explained(fit) + robot.inverse_dynamics(slow.q, slow.dq, slow.ddq)
     q = as_measured(logged, problem.signals, slow.q, shifted=False)
     imitated = make_problem(
-        logged.with_(q=q, dq=slow.dq, ddq=slow.ddq),
+        logged.with_(q=q, dq=slow.dq, ddq=slow.ddq, cutoff=problem.signals.cutoff),
         torque,
         robot=robot,
         rigid_body=problem.rigid_body,

@@ -16,8 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from skidyn._sensor_steps import position_step
 from skidyn._signals import Array, Signals
-from skidyn.measurement import channel_step, position_step
+from skidyn.measurement import channel_step
 
 #: Variance of the third difference of white noise of unit variance: 1 + 9 + 9 + 1.
 GAIN = 20.0

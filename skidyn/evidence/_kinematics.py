@@ -4,18 +4,23 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._local_polynomial import local_polynomial
+from skidyn._repeated import stale_rows
 from skidyn._signals import Array, Signals
+from skidyn.evidence._cutoff import CUTOFF_SHARE, lowered_cutoff
 
 #: Order of the local polynomial. Of accelerations of 6 Hz sampled at 100 Hz, a quartic of the same
 #: noise loses 0.7 %, which looks like an elastic joint if the torque is precise; this order loses
 #: 0.1 %.
 ORDER = 6
-#: Highest cut-off in Hz, and the largest share of the sampling rate.
-HIGHEST_CUTOFF, CUTOFF_SHARE = 27.0, 0.24
+#: Highest cut-off, Hz.
+HIGHEST_CUTOFF = 27.0
 #: Relative spread of time steps above which positions are interpolated to an even grid first.
 EVEN_STEPS = 1e-3
+#: Largest half width of a window in samples.
+WIDEST = 250
 
 
 def smooth_motion(signals: Signals, cutoff: float | None = None) -> Signals:
@@ -24,55 +29,88 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> Signals:
     Parameters
     ----------
     signals : Signals
-        Logged motion; dq and ddq are not used.
+        Logged motion; dq and ddq are not used. Smoothed motion is smoothed again as it was.
     cutoff : float, Hz, optional
-        Cut-off; by default 24 % of the sampling rate, at most 27 Hz.
+        Cut-off; by default 24 % of the sampling rate, at most 27 Hz, and less for coarse positions
+        (``_cutoff.py``).
 
     Returns
     -------
     Signals
-        Samples near the ends of a segment are not valid.
+        Samples near the ends of a segment are not valid, nor are rows that repeat the previous one;
+        their positions are interpolated between the others.
     """
-    rate = signals.rate
-    half, used = _half_width(rate, cutoff)
+    rate, stale = signals.rate, stale_rows(signals)
+    parts = [_Part(signals, rows, ~stale[rows], rate) for rows in signals.segments]
+    if cutoff is None and np.isfinite(signals.cutoff):
+        cutoff = signals.cutoff
+    if cutoff is None:
+        highest = min(HIGHEST_CUTOFF, CUTOFF_SHARE * rate)
+        alike = [part.even for part in parts if part.rate == rate]
+        cutoff = lowered_cutoff(alike, rate, highest, ORDER, _half_width, signals.unit)
     q, dq, ddq = (np.array(x, dtype=float) for x in (signals.q, signals.dq, signals.ddq))
-    valid = np.ones(signals.q.shape, dtype=bool)
-    for rows in signals.segments:
-        own = signals.take(rows).rate if len(signals.segments) > 1 else rate
-        own = own if abs(own - rate) > EVEN_STEPS * rate else rate  # recordings of several rates
-        width, _ = _half_width(own, cutoff)
-        # Irregular samples are too many for their median step, or too few for the time they span.
-        steps = round(float(np.ptp(signals.clock[rows])) * own)
-        if min(rows.stop - rows.start, steps + 1) <= 2 * width + 1:
+    valid = np.repeat(~stale[:, None], signals.n_joints, axis=1)
+    for part in parts:
+        rows, width = part.rows, _half_width(part.rate, cutoff)
+        if part.enough <= 2 * width + 1:
             valid[rows] = False  # too short to smooth; kept as logged, and not used
             continue
-        q[rows], dq[rows], ddq[rows] = _local_polynomial(
-            signals.clock[rows], signals.q[rows], own, width
-        )
+        q[rows], dq[rows], ddq[rows] = part.smoothed(width)
         edge = max(2, width // 2)
         valid[rows.start : rows.start + edge] = False
         valid[rows.stop - edge : rows.stop] = False
-    return signals.with_(q=q, dq=dq, ddq=ddq, valid=valid, half_width=half, cutoff=used)
+    half = _half_width(rate, cutoff)
+    return signals.with_(q=q, dq=dq, ddq=ddq, valid=valid, half_width=half, cutoff=cutoff)
 
 
-def _half_width(rate: float, cutoff: float | None) -> tuple[int, float]:
-    """Half width of the smoother in samples, and its cut-off in Hz."""
-    cutoff = min(HIGHEST_CUTOFF, CUTOFF_SHARE * rate) if cutoff is None else cutoff
-    # Cut-off of a Savitzky-Golay filter of this order and half width (Schafer 2011, IEEE SPM 28).
+class _Part:
+    """Positions of a segment at even steps.
+
+    Attributes
+    ----------
+    rows : slice
+        The segment.
+    rate : float, Hz
+        Rate of the log, or that of the segment if it differs.
+    enough : int
+        Number of samples that the smoother can use.
+    even : ndarray of shape (n, n_joints), rad or m
+        Positions, interpolated where samples were uneven or repeat the previous one.
+    """
+
+    def __init__(
+        self, signals: Signals, rows: slice, fresh: NDArray[np.bool_], rate: float
+    ) -> None:
+        self.rows = rows
+        self._time, q = signals.clock[rows], signals.q[rows]
+        own = signals.take(rows).rate if len(signals.segments) > 1 else rate
+        self.rate = own if abs(own - rate) > EVEN_STEPS * rate else rate
+        # Irregular samples are too many for their median step, or too few for the time they span.
+        steps = round(float(np.ptp(self._time)) * self.rate)
+        self.enough = min(int(fresh.sum()), steps + 1)
+        changes = np.diff(self._time)
+        even = len(changes) == 0 or (np.ptp(changes) < EVEN_STEPS / self.rate and fresh.all())
+        # Times that are equal or decrease cannot be interpolated; data checks report them.
+        self._grid: Array | None = None
+        self.even = q
+        if not even and not np.any(changes <= 0) and fresh.sum() > 1:
+            from scipy.interpolate import CubicSpline
+
+            self._grid = np.arange(self._time[0], self._time[-1] + 0.5 / self.rate, 1 / self.rate)
+            self.even = CubicSpline(self._time[fresh], q[fresh])(self._grid)
+
+    def smoothed(self, half: int) -> list[Array]:
+        """Smoothed position and its two derivatives at the times of the samples."""
+        smoothed = local_polynomial(self.even, 2 * half + 1, ORDER, 1 / self.rate)
+        if self._grid is None:
+            return list(smoothed)
+        from scipy.interpolate import CubicSpline
+
+        inside = np.clip(self._time, self._grid[0], self._grid[-1])
+        return [CubicSpline(self._grid, x)(inside) for x in smoothed]
+
+
+def _half_width(rate: float, cutoff: float) -> int:
+    """Half width of a Savitzky-Golay filter in samples (Schafer 2011, IEEE SPM 28)."""
     half = ((ORDER + 1) / (2 * cutoff / rate) + 4.6) / 3.2
-    return int(np.clip(round(half), 4, 60)), cutoff
-
-
-def _local_polynomial(time: Array, q: Array, rate: float, half: int) -> list[Array]:
-    """Smoothed position and its two derivatives at the given times."""
-    step = 1.0 / rate
-    # Times that are equal or decrease cannot be interpolated; data checks report them.
-    even = np.ptp(np.diff(time)) < EVEN_STEPS * step or np.any(np.diff(time) <= 0)
-    grid = time if even else np.arange(time[0], time[-1] + step / 2, step)
-    if even:
-        return list(local_polynomial(q, 2 * half + 1, ORDER, step))
-    from scipy.interpolate import CubicSpline
-
-    smoothed = local_polynomial(CubicSpline(time, q)(grid), 2 * half + 1, ORDER, step)
-    inside = np.clip(time, grid[0], grid[-1])
-    return [CubicSpline(grid, x)(inside) for x in smoothed]
+    return int(np.clip(round(half), 4, WIDEST))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from skidyn._exceptions import LogError
+from skidyn._repeated import is_repeated
 from skidyn._signals import find_segments
 from skidyn.logs._placeholders import Placeholder
 
@@ -456,7 +457,7 @@ def _without_lowpass(
 
 
 def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataFrame:
-    from skidyn.measurement import idle_rows, is_held, is_repeated
+    from skidyn.measurement import idle_rows, is_held
 
     q = table[[f"q{k + 1}" for k in range(n)]].to_numpy(dtype=float)
     number = table["trajectory"].to_numpy()

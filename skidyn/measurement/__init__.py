@@ -29,8 +29,6 @@ from skidyn.measurement._measures import (
     channel_step as channel_step,
     idle_rows as idle_rows,
     is_held as is_held,
-    is_repeated as is_repeated,
-    position_step as position_step,
     rest_share as rest_share,
     reversals as reversals,
 )

@@ -9,11 +9,11 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._sensor_steps import position_step
 from skidyn._signals import Array, runs_of
 from skidyn.measurement._check import Check
 from skidyn.measurement._fits import Fits
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import position_step
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
 

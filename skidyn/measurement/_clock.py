@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._repeated import REPEATED, moves_by_steps, repeated_rows, stale_rows
 from skidyn._signals import Array, Signals, find_segments
 from skidyn.measurement._arrival import rows_after_false_gaps, without_false_gaps
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
-from skidyn.measurement._measures import is_repeated
 from skidyn.measurement._suspicion import Suspicion, remedy_of, resample_to
 
 #: Stamps closer to a regular clock than this share of a step do not jitter.
@@ -35,8 +35,8 @@ CLOSER = 1.1
 #: Share of long steps from which stamps may be rounded, and largest distance of rounded stamps from
 #: even ones, in steps; lost rows make the distance larger.
 MISSING, ROUNDED = 0.05, 1.5
-#: Share of rows that repeat the previous one, or lie on a line between their neighbours.
-REPEATED, ON_A_LINE = 0.02, 0.3
+#: Share of rows that lie on a line between their neighbours.
+ON_A_LINE = 0.3
 #: Rounding error of numbers of seven digits, relative to the largest; how many times this a bend is
 #: at least, but for some rows, as a share of those on a line, if rows were interpolated.
 FEW_DIGITS, CLEARLY, NOT_BENT = 2e-6, 10.0, 1.15
@@ -46,8 +46,6 @@ NEARLY = 0.1
 SAME = 0.05
 #: Share of repeated rows from which accelerations, and with them findings, are wrong.
 MANY = 0.2
-#: Most steps of a sensor by which a position changes after rows that repeat because it is coarse.
-STEPS = 3.0
 
 
 def regular_clock(time: Array, trajectory: NDArray[np.int64], q: Array | None = None) -> Array:
@@ -264,7 +262,7 @@ class ClockJitter(Check):
         step = float(np.mean(measurement.steps[measurement.steps < 2.5 / measurement.rate]))
         if distance_from_regular(signals.clock, signals.trajectory)[2] < REGULAR * step:
             return
-        again = is_repeated(signals.q, signals.dq, signals.trajectory)
+        again = repeated_rows(signals)
         found = find_jitter(signals.clock, signals.q, signals.trajectory, again)
         size = (
             f"{1e3 * found.spread:.3g} ms"
@@ -340,29 +338,25 @@ class RepeatedRows(Check):
         if count > REPEATED * measurement.n_samples:
             share = count / measurement.n_samples
             measurement.stale = True
+            left_out = stale_rows(measurement.signals).any()
             yield self.suspicion(
                 "rows repeat the previous one",
                 f"in {count} of {measurement.n_samples} rows no position changes although joints "
-                "move: the recorder polled faster than the robot reports, so derivatives are too "
-                "noisy",
+                "move: the recorder polled faster than the robot reports, "
+                + (
+                    "and derivatives are computed without these rows"
+                    if left_out
+                    else "so derivatives are too noisy"
+                ),
                 "noted" if _coarse(measurement) else "certain" if share > MANY else "suspected",
                 remedy=remedy_of("drop_repeated", True),
             )
 
 
 def _coarse(measurement: Measurement) -> bool:
-    """Whether rows repeat because the position sensor is coarse: torque then still changes.
-
-    After coarse rows, positions change by a step or two; after repeated rows, by all the missed
-    motion.
-    """
+    """Whether rows repeat because the position sensor is coarse: torque then still changes."""
     s = measurement.signals
-    sizes = []
-    for k in range(measurement.n_joints):
-        changes, step = np.abs(np.diff(s.q[:, k])), measurement.position_steps[k]
-        if np.isfinite(step) and changes.any():
-            sizes.append(float(np.median(changes[changes > 0])) / step)
-    if not sizes or np.median(sizes) > STEPS:
+    if not moves_by_steps(s):
         return False
     same = np.all(s.q[1:] == s.q[:-1], axis=1) & s.within
     other = np.any(measurement.torque[1:] != measurement.torque[:-1], axis=1)

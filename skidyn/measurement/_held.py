@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._sensor_steps import step_of_values
 from skidyn._signals import Array, Signals
 from skidyn.measurement._check import Check
 from skidyn.measurement._measurement import Measurement
@@ -18,7 +19,6 @@ from skidyn.measurement._measures import (
     STRIDE,
     equal_values,
     is_held,
-    step_of_values,
 )
 from skidyn.measurement._odd_motion import LEAST_SPEED, LEAST_SWEPT
 from skidyn.measurement._placeholder import placeholder_remedy

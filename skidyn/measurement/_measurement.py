@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._repeated import repeated_rows
+from skidyn._sensor_steps import position_step
 from skidyn._signals import Array, Signals, rates_of
 from skidyn._text import listed
 from skidyn.measurement._consistency import velocity_consistency
@@ -21,10 +23,8 @@ from skidyn.measurement._measures import (
     excited,
     held_share,
     idle_rows,
-    is_repeated,
     longest_plateau_share,
     missing_values,
-    position_step,
     step_share,
 )
 from skidyn.measurement._results import Results
@@ -280,7 +280,7 @@ class Measurement:
     def velocities(self) -> list[tuple[float, float]]:
         """Slope and correlation of integrated velocity on position, by joint."""
         s = self.whole
-        fresh = ~is_repeated(s.q, s.dq, s.trajectory)
+        fresh = ~repeated_rows(s)
         s = s if fresh.all() else s.take(fresh)
         odd = list(self.odd_motion)
         parts = [rows for rows in s.segments if s.trajectory[rows.start] not in odd]
@@ -353,8 +353,7 @@ class Measurement:
     @cached_property
     def repeated(self) -> int:
         """Rows that repeat all positions of the previous row although joints move."""
-        s = self.signals
-        return int(is_repeated(s.q, s.dq, s.trajectory).sum())
+        return int(repeated_rows(self.signals).sum())
 
     @cached_property
     def at_limit(self) -> list[float]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from skidyn._sensor_steps import step_of_values
 from skidyn._signals import runs_of
 
 #: Least step of a coarse position, rad: a turn in 13 bits.
@@ -36,37 +37,6 @@ MORE_ZEROS = 2.0
 FEW_VALUES = 64
 #: Fewest values of a torque that is not coarse.
 FINE = 50
-#: Share of the distance that its velocity implies by which a position that was held moves on.
-CAUGHT = 0.3
-#: The same in smallest changes of it: a joint may begin to move by one step of its sensor.
-ONE_STEP = 1.5
-
-
-def position_step(position: np.ndarray) -> float:
-    """Step of a position sensor, or NaN where positions are not visibly quantised.
-
-    Gaps between neighbouring distinct values are whole multiples of the step of the sensor.
-    """
-    return step_of_values(np.unique(position))
-
-
-def step_of_values(position: np.ndarray) -> float:
-    """The same from distinct values in ascending order."""
-    gaps = np.diff(position)
-    gaps = gaps[gaps > 1e-12]
-    if len(gaps) < 20:
-        return np.nan
-    count = max(len(gaps) // 50, 5)
-    smallest = np.sort(np.partition(gaps, count - 1)[:count])
-    step = float(np.median(smallest))
-    if step < 0.8 * smallest[-1] or smallest[0] < 0.8 * step:
-        return np.nan
-    largest = float(np.abs(position).max())
-    if step < 8 * np.finfo(np.float32).eps * largest and np.all(position == np.float32(position)):
-        return np.nan  # the step of the numbers in the file, not of the sensor
-    multiples = gaps[gaps < 20 * step] / step
-    whole = np.abs(multiples - np.round(multiples)) < 0.1
-    return step if whole.mean() > 0.9 else np.nan
 
 
 def channel_step(values: np.ndarray) -> float:
@@ -83,49 +53,6 @@ def step_share(values: np.ndarray, step: float) -> float:
     return step / spread if np.isfinite(step) and spread else 0.0
 
 
-def is_repeated(position: np.ndarray, velocity: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
-    """Rows in which no position changes although some joint moves, as a mask."""
-    again = np.zeros(len(position), dtype=bool)
-    same = np.all(position[1:] == position[:-1], axis=1) & (trajectory[1:] == trajectory[:-1])
-    if not same.any():
-        return again
-    # a velocity that never changes was not measured
-    fast = np.where(np.ptp(velocity, axis=0) > 0, 0.02 * np.abs(velocity).max(axis=0), np.inf)
-    moving = np.any(np.abs(velocity[1:]) > fast, axis=1)
-    again[1:] = same & moving
-    again[1:] &= _caught_up(position, velocity, trajectory, same)[1:]
-    # a coarse sensor holds its value too, but each joint by itself
-    single = np.mean(position[1:] == position[:-1], axis=0)
-    single = single[np.ptp(position, axis=0) > 0]
-    at_once = len(single) < 2 or same.mean() > AT_ONCE * np.median(single)
-    return again if at_once else np.zeros_like(again)
-
-
-def _caught_up(
-    position: np.ndarray, velocity: np.ndarray, trajectory: np.ndarray, same: np.ndarray
-) -> np.ndarray:
-    """Rows after which positions move on by more than in one step, as a mask.
-
-    Joints at rest whose velocity is late or noisy do not, nor does a sensor that moves on by one of
-    its steps.
-    """
-    moved = np.abs(np.diff(position, axis=0))
-    moved[trajectory[1:] != trajectory[:-1]] = 0
-    fresh = np.flatnonzero(~same)  # steps in which positions change, or trajectories
-    after = np.searchsorted(fresh, np.arange(len(same)))
-    step = np.zeros_like(moved)
-    known = after < len(fresh)
-    step[known] = moved[fresh[after[known]]]
-    speed = np.abs(velocity[1:])
-    slow = np.sum(speed[~same], axis=0)
-    usual = np.sum(moved[~same], axis=0) / np.where(slow > 0, slow, 1.0)
-    least = np.min(moved, axis=0, where=moved > 0, initial=np.inf)
-    caught = np.zeros(len(position), dtype=bool)
-    further = (step > CAUGHT * usual * speed) & (step > ONE_STEP * least)
-    caught[1:] = np.any(further & (speed > 0), axis=1)
-    return caught
-
-
 def held_share(position: np.ndarray, within: np.ndarray, step: float) -> float:
     """Share of steps in which a moving position does not change, and then catches up.
 
@@ -136,7 +63,7 @@ def held_share(position: np.ndarray, within: np.ndarray, step: float) -> float:
     within : ndarray of shape (n_samples - 1,) of bool
         Steps within a trajectory.
     step : float, rad or m
-        Of the sensor, as of :func:`position_step`.
+        Of the sensor.
 
     Returns
     -------
