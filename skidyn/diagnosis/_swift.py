@@ -25,7 +25,7 @@ from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._hypothesis import Hypothesis, SearchResult, terms_on_rows
 from skidyn.diagnosis._noise import sensor_noise
 from skidyn.diagnosis._remainder import position_noise
-from skidyn.diagnosis._rule import SHORT_WINDOW, Settings
+from skidyn.diagnosis._rule import SHORT_IN_PERIODS, SHORT_WINDOW, Settings
 from skidyn.diagnosis._search import search
 from skidyn.effects import TermSum, get_effect, make_terms
 from skidyn.evidence import FEWEST_SAMPLES, Problem, with_short_windows
@@ -56,7 +56,8 @@ def look_at_swift(
     """
     family = [k for k in kinds if get_effect(k).moves_link]
     clocked = problem.signals.time is not None and problem.robot is not None
-    if not family or not clocked or problem.signals.rate * SHORT_WINDOW < FEWEST_SAMPLES:
+    window = max(SHORT_WINDOW, SHORT_IN_PERIODS / problem.signals.cutoff)
+    if not family or not clocked or problem.signals.rate * window < FEWEST_SAMPLES:
         return problem, result
     residual = problem.torque - problem.explained(result.fit)
     sensor = np.nan_to_num(sensor_noise(problem.signals, residual, problem.measured))
@@ -73,7 +74,7 @@ def look_at_swift(
         if room < 1:
             return problem, result
         terms = (*problem.terms, *terms_on_rows(slow), *noise)
-        short = with_short_windows(problem, terms, SHORT_WINDOW)
+        short = with_short_windows(problem, terms, window)
         short.torque = problem.torque - others.ripple
         # Errors of smoothing are equally large in short windows, and more significant in more
         # windows.

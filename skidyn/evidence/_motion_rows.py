@@ -46,10 +46,19 @@ def read_motion(signals: Signals, smooth: bool, torque: Array) -> Signals:
     return motion if smooth else motion.with_(q=signals.q, dq=signals.dq, ddq=signals.ddq)
 
 
-def motion_rows(signals: Signals, reversals: Sequence[int], window: float = WINDOW) -> Rows:
-    """Averaging windows over the samples that count."""
+def usual_window(signals: Signals) -> float:
+    """Width of a window in s: the first zero of its spectrum is at most the smoother's cut-off.
+
+    What the smoother removes from the motion would else be left in the rows of the torque.
+    """
+    return max(WINDOW, 2 / signals.cutoff)
+
+
+def motion_rows(signals: Signals, reversals: Sequence[int], window: float | None = None) -> Rows:
+    """Averaging windows over the samples that count, of the usual width unless it is given."""
     if signals.time is None:
         return every_sample(signals)
+    window = usual_window(signals) if window is None else window
     margin = np.full(signals.n_joints, max(1, round(MARGIN * signals.half_width)))
     margin[list(reversals)] = SHORT_MARGIN
     use = sliding_samples(signals, signals.usable, margin.tolist())
@@ -66,12 +75,13 @@ def rows_and_folds(
     signals: Signals,
     reversals: Sequence[int],
     weight: Array | None = None,
-    window: float = WINDOW,
+    window: float | None = None,
 ) -> RowsAndFolds:
     """Averaging windows and the folds they fall into."""
     # A slow log has wider windows, which extend further over a border; single samples do not.
     clock = signals.time is not None
-    guard = max(WINDOW_GUARD, _half_window(signals.rate)) if clock else 0.0
+    half = max(WINDOW_GUARD, usual_window(signals) / 2, _half_window(signals.rate))
+    guard = half if clock else 0.0
     rows = motion_rows(signals, reversals, window)
     return _folds(rows if weight is None else rows.weighted(weight), guard)
 

@@ -95,8 +95,9 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
     forgetting : float, default=1.0
         Weight of all earlier rows at each call of ``partial_fit``; 1 keeps their weight.
     smooth : bool or None, default=None
-        Derive velocity and acceleration from the positions by a zero-phase smoother. None does so
-        if X has no accelerations. Requires time.
+        Derive velocity and acceleration from the positions by a zero-phase smoother, whose cut-off
+        follows from the noise of the positions of X. None does so if X has no accelerations.
+        Requires time.
     trajectory, time : int, str or None, default="auto"
         Key columns of X; ``"auto"`` takes the columns of these names.
 
