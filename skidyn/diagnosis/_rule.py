@@ -223,7 +223,7 @@ BEGINNING_ALIKE = 0.8
 BEGINNING_STANDS_OUT = 2.0
 
 #: Windows, in s, for effects that move the link (``_swift.py``): crossing a play of a few mrad
-#: takes as long. They are longer where the cut-off of coarse positions was lowered, in periods of it.
+#: takes as long. They are longer, in periods of the cut-off, where that of coarse positions is low.
 SHORT_WINDOW, SHORT_IN_PERIODS = 1 / 32, 0.84
 
 
