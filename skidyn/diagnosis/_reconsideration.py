@@ -333,7 +333,22 @@ class ReconsideringSearch(DuellingSearch):
                 kept = ()
             if len(kept) < len(old.candidates):
                 self._replace(old, kept, without)
+            if not kept and newest is not None:
+                newest = self._in_place_of(old, newest)
         return newest
+
+    def _in_place_of(self, old: Hypothesis, function: Hypothesis) -> Hypothesis:
+        """A function that explains what a name did, which is the known effect closest to it."""
+        if function.kind != UNKNOWN or UNKNOWN == old.kind or function.joints != old.joints:
+            return function
+        place = self.findings.index(function)
+        self.findings[place] = replace(
+            function,
+            gain=function.gain + old.gain,
+            score=function.score + old.score,
+            others=(old, *function.others),
+        )
+        return self.findings[place]
 
     def _refined_anew(self, finding: Hypothesis) -> Hypothesis:
         """A finding with its shapes searched again after a change of others."""
