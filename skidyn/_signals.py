@@ -158,9 +158,11 @@ class Signals:
         False for a sample of a joint that is not to be used: broken, or near the end of a segment,
         where the smoother is one-sided. None if all samples are good.
     half_width : int
-        Half the width of the window in which the motion was smoothed, in samples; 0 as logged.
-    cutoff : float
-        Cut-off of that smoother, Hz; infinite where none has been chosen.
+        Half the width of the windows in which the motion was smoothed, in samples, at most; 0 as
+        logged.
+    cutoff : ndarray of shape (n_samples,) or None
+        Cut-off of that smoother, Hz, equal for all samples of a trajectory; None if none has been
+        chosen.
     """
 
     q: Array
@@ -177,7 +179,7 @@ class Signals:
     inertial_parameters: Array | None = None
     valid: NDArray[np.bool_] | None = None
     half_width: int = 0
-    cutoff: float = np.inf
+    cutoff: Array | None = None
 
     def __post_init__(self) -> None:
         if len(self.prismatic) == 0:
@@ -294,7 +296,7 @@ class Signals:
     def take(self, rows: slice | NDArray[Any]) -> Signals:
         """The same signals on some rows."""
         per_sample = ("q", "dq", "ddq", "trajectory", "time", "temperature", "load", "valid")
-        values = {name: getattr(self, name) for name in per_sample}
+        values = {name: getattr(self, name) for name in (*per_sample, "cutoff")}
         values |= {name: field.stored(self) for name, field in _LATER.items()}
         return replace(self, **{name: _rows(value, rows) for name, value in values.items()})
 

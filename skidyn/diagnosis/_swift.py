@@ -56,7 +56,9 @@ def look_at_swift(
     """
     family = [k for k in kinds if get_effect(k).moves_link]
     clocked = problem.signals.time is not None and problem.robot is not None
-    window = max(SHORT_WINDOW, SHORT_IN_PERIODS / problem.signals.cutoff)
+    cutoffs = problem.signals.cutoff
+    lowest = np.inf if cutoffs is None else float(cutoffs.min())
+    window = max(SHORT_WINDOW, SHORT_IN_PERIODS / lowest)
     if not family or not clocked or problem.signals.rate * window < FEWEST_SAMPLES:
         return problem, result
     residual = problem.torque - problem.explained(result.fit)
@@ -92,7 +94,7 @@ def look_at_swift(
             c.term.effect.fastest(c.term.shape) for h in moved.findings for c in h.candidates
         ]
         # Smoothing weakens higher frequencies, which resembles an oscillating link.
-        if max(fastest, default=0.0) > problem.signals.cutoff:
+        if max(fastest, default=0.0) > lowest:
             return problem, result
         # A link that oscillates in the long windows, too, does not cross a play.
         if not now or not before.items() <= now.items():

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,8 +34,8 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> Signals:
     signals : Signals
         Logged motion; dq and ddq are not used. Smoothed motion is smoothed again as it was.
     cutoff : float, Hz, optional
-        Cut-off; by default 24 % of the sampling rate, at most 27 Hz, and less for coarse positions
-        (``_cutoff.py``).
+        Cut-off; by default 24 % of the sampling rate, at most 27 Hz, and less in trajectories with
+        coarse positions (``_cutoff.py``).
 
     Returns
     -------
@@ -42,16 +45,16 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> Signals:
     """
     rate, stale = signals.rate, stale_rows(signals)
     parts = [_Part(signals, rows, ~stale[rows], rate) for rows in signals.segments]
-    if cutoff is None and np.isfinite(signals.cutoff):
-        cutoff = signals.cutoff
-    if cutoff is None:
-        highest = min(HIGHEST_CUTOFF, CUTOFF_SHARE * rate)
-        alike = [part.even for part in parts if part.rate == rate]
-        cutoff = lowered_cutoff(alike, rate, highest, ORDER, _half_width, signals.unit)
     q, dq, ddq = (np.array(x, dtype=float) for x in (signals.q, signals.dq, signals.ddq))
     valid = np.repeat(~stale[:, None], signals.n_joints, axis=1)
+    if cutoff is not None:
+        cutoffs = np.full(signals.n_samples, cutoff)
+    elif signals.cutoff is not None:
+        cutoffs = signals.cutoff
+    else:
+        cutoffs = _chosen(signals, parts, rate)
     for part in parts:
-        rows, width = part.rows, _half_width(part.rate, cutoff)
+        rows, width = part.rows, half_width(part.rate, cutoffs[part.rows.start])
         if part.enough <= 2 * width + 1:
             valid[rows] = False  # too short to smooth; kept as logged, and not used
             continue
@@ -59,8 +62,23 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> Signals:
         edge = max(2, width // 2)
         valid[rows.start : rows.start + edge] = False
         valid[rows.stop - edge : rows.stop] = False
-    half = _half_width(rate, cutoff)
-    return signals.with_(q=q, dq=dq, ddq=ddq, valid=valid, half_width=half, cutoff=cutoff)
+    half = half_width(rate, cutoffs.min(initial=HIGHEST_CUTOFF))
+    return signals.with_(q=q, dq=dq, ddq=ddq, valid=valid, half_width=half, cutoff=cutoffs)
+
+
+def _chosen(signals: Signals, parts: Sequence[_Part], rate: float) -> Array:
+    """Cut-off of every sample, Hz, chosen for each trajectory."""
+    highest = min(HIGHEST_CUTOFF, CUTOFF_SHARE * rate)
+    cutoffs = np.full(signals.n_samples, highest)
+    of: dict[Any, list[_Part]] = {}
+    for part in parts:
+        of.setdefault(signals.trajectory[part.rows.start], []).append(part)
+    for own in of.values():
+        even = [part.even for part in own if part.rate == rate]
+        lowered = lowered_cutoff(even, rate, highest, ORDER, half_width, signals.unit)
+        for part in own:
+            cutoffs[part.rows] = lowered
+    return cutoffs
 
 
 class _Part:
@@ -110,7 +128,7 @@ class _Part:
         return [CubicSpline(self._grid, x)(inside) for x in smoothed]
 
 
-def _half_width(rate: float, cutoff: float) -> int:
+def half_width(rate: float, cutoff: float) -> int:
     """Half width of a Savitzky-Golay filter in samples (Schafer 2011, IEEE SPM 28)."""
     half = ((ORDER + 1) / (2 * cutoff / rate) + 4.6) / 3.2
     return int(np.clip(round(half), 4, WIDEST))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals, blocks_held_out
 from skidyn.evidence._broken import without_broken
-from skidyn.evidence._kinematics import smooth_motion
+from skidyn.evidence._kinematics import half_width, smooth_motion
 from skidyn.evidence._rows import (
     FEWEST_SAMPLES,
     WINDOW,
@@ -46,29 +46,43 @@ def read_motion(signals: Signals, smooth: bool, torque: Array) -> Signals:
     return motion if smooth else motion.with_(q=signals.q, dq=signals.dq, ddq=signals.ddq)
 
 
-def usual_window(signals: Signals) -> float:
-    """Width of a window in s: the first zero of its spectrum is at most the smoother's cut-off.
+def usual_windows(signals: Signals) -> Array:
+    """Width of the windows of every segment in s.
 
-    What the smoother removes from the motion would else be left in the rows of the torque.
+    The first zero of their spectrum is at most the cut-off of the smoother: what this removes from
+    the motion would else be left in the rows of the torque.
     """
-    return max(WINDOW, 2 / signals.cutoff)
+    if signals.cutoff is None:
+        return np.full(len(signals.segments), WINDOW)
+    return np.array([max(WINDOW, 2 / signals.cutoff[r.start]) for r in signals.segments])
+
+
+def _margins(signals: Signals, reversals: Sequence[int]) -> NDArray[np.int64]:
+    """Samples left out beside a reversal, (n_segments, n_joints)."""
+    margins = np.ones((len(signals.segments), signals.n_joints), dtype=np.int64)
+    if signals.cutoff is not None:
+        reach = [half_width(signals.rate, signals.cutoff[r.start]) for r in signals.segments]
+        margins *= np.array([max(1, round(MARGIN * half)) for half in reach])[:, None]
+    margins[:, list(reversals)] = SHORT_MARGIN
+    return margins
 
 
 def motion_rows(signals: Signals, reversals: Sequence[int], window: float | None = None) -> Rows:
     """Averaging windows over the samples that count, of the usual width unless it is given."""
     if signals.time is None:
         return every_sample(signals)
-    window = usual_window(signals) if window is None else window
-    margin = np.full(signals.n_joints, max(1, round(MARGIN * signals.half_width)))
-    margin[list(reversals)] = SHORT_MARGIN
-    use = sliding_samples(signals, signals.usable, margin.tolist())
-    step = column_step(signals, window, int(margin.min()))
-    rows = window_rows(signals, use, window, step)
+    windows = usual_windows(signals)
+    if window is not None:
+        windows = np.full_like(windows, window)
+    margins = _margins(signals, reversals)
+    use = sliding_samples(signals, signals.usable, margins)
+    step = column_step(signals, float(windows.min()), int(margins.min()))
+    rows = window_rows(signals, use, windows, step)
     few = rows.counts < FEWEST_ROWS
     if not (few & (rows.counts > 0)).any():
         return rows
     use = use & ~few  # a joint that slides for a moment only is treated as one at rest
-    return window_rows(signals, use, window, step)
+    return window_rows(signals, use, windows, step)
 
 
 def rows_and_folds(
@@ -80,8 +94,8 @@ def rows_and_folds(
     """Averaging windows and the folds they fall into."""
     # A slow log has wider windows, which extend further over a border; single samples do not.
     clock = signals.time is not None
-    half = max(WINDOW_GUARD, usual_window(signals) / 2, _half_window(signals.rate))
-    guard = half if clock else 0.0
+    widest = float(usual_windows(signals).max(initial=0.0))
+    guard = max(WINDOW_GUARD, widest / 2, _half_window(signals.rate)) if clock else 0.0
     rows = motion_rows(signals, reversals, window)
     return _folds(rows if weight is None else rows.weighted(weight), guard)
 

@@ -255,7 +255,7 @@ def every_sample(signals: Signals) -> Rows:
 
 
 def sliding_samples(
-    signals: Signals, valid: NDArray[np.bool_], margin: int | Sequence[int]
+    signals: Signals, valid: NDArray[np.bool_], margin: int | NDArray[np.int64]
 ) -> NDArray[np.bool_]:
     """Samples at which a joint slides, neither at rest nor near a reversal.
 
@@ -265,23 +265,23 @@ def sliding_samples(
         Smoothed motion.
     valid : ndarray of shape (n_samples, n_joints) of bool
         Samples where motion and torque can be trusted.
-    margin : int or sequence of int
-        Samples left out on each side, such as the reach of the smoother; by joint if several.
+    margin : int or ndarray of int of shape (n_segments, n_joints)
+        Samples left out on each side, such as the reach of the smoother.
 
     Returns
     -------
     ndarray of shape (n_samples, n_joints) of bool
     """
-    margins = np.broadcast_to(margin, signals.n_joints)
+    margins = np.broadcast_to(margin, (len(signals.segments), signals.n_joints))
     sliding = valid.copy()
-    for rows in signals.segments:
+    for rows, reaches in zip(signals.segments, margins, strict=True):
         velocity = signals.dq[rows]
         still = np.abs(velocity) <= REST * signals.unit
         turns = np.diff(np.sign(velocity), axis=0) != 0
         still[:-1] |= turns
         still[1:] |= turns
-        for reach in set(margins.tolist()):
-            own = np.flatnonzero(margins == reach)
+        for reach in set(reaches.tolist()):
+            own = np.flatnonzero(reaches == reach)
             sliding[rows, own] &= ~widened(still[:, own], reach)
     return sliding
 
@@ -368,7 +368,7 @@ def widened(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
 
 
 def window_rows(
-    signals: Signals, use: NDArray[np.bool_], window: float = WINDOW, step: int = 1
+    signals: Signals, use: NDArray[np.bool_], window: float | Array = WINDOW, step: int = 1
 ) -> Rows:
     """Averaging windows over the samples that may be used.
 
@@ -378,12 +378,16 @@ def window_rows(
         Motion.
     use : ndarray of shape (n_samples, n_joints) of bool
         Samples that may be used.
-    window : float, s, default=1/8
-        Width of the window; widened to hold six samples of each trajectory.
+    window : float or ndarray of shape (n_segments,), s, default=1/8
+        Width of the windows; widened to hold six samples of each trajectory.
     step : int, default=1
         As in :class:`Rows`.
     """
-    spans = [_windows(signals.clock[rows], rows.start, window) for rows in signals.segments]
+    widths = np.broadcast_to(window, len(signals.segments)).tolist()
+    spans = [
+        _windows(signals.clock[rows], rows.start, width)
+        for rows, width in zip(signals.segments, widths, strict=True)
+    ]
     counts = [len(span.middle) for span in spans]
     middle = np.concatenate([span.middle for span in spans])
     name = np.repeat(signals.trajectory[[rows.start for rows in signals.segments]], counts)
