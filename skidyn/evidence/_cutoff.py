@@ -25,8 +25,9 @@ CUTOFF_SHARE = 0.24
 #: How far above the cut-off that predicts positions best the chosen one is: the smoother loses a
 #: few percent of an acceleration just below its cut-off, which do not matter to a position.
 ABOVE = 1.5
-#: Share of the samples of the shortest recording that the half width of a window may have.
-LONGEST = 1 / 8
+#: Share of the samples of a recording that the half width of the smoother may have: some 16 windows
+#: of rows, which are as wide as the cut-off demands, fit side by side.
+LONGEST = 1 / 30
 #: Samples of all recordings from which a cut-off is chosen.
 MOST_SAMPLES = 20_000
 #: Median of the size of a normal variable of unit variance.

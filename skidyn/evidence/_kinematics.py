@@ -68,7 +68,7 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> Signals:
 
 def _chosen(signals: Signals, parts: Sequence[_Part], rate: float) -> Array:
     """Cut-off of every sample, Hz, chosen for each trajectory."""
-    highest = min(HIGHEST_CUTOFF, CUTOFF_SHARE * rate)
+    highest = usual_cutoff(rate)
     cutoffs = np.full(signals.n_samples, highest)
     of: dict[Any, list[_Part]] = {}
     for part in parts:
@@ -126,6 +126,11 @@ class _Part:
 
         inside = np.clip(self._time, self._grid[0], self._grid[-1])
         return [CubicSpline(self._grid, x)(inside) for x in smoothed]
+
+
+def usual_cutoff(rate: float) -> float:
+    """Cut-off in Hz for positions without much noise."""
+    return min(HIGHEST_CUTOFF, CUTOFF_SHARE * rate)
 
 
 def half_width(rate: float, cutoff: float) -> int:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals, blocks_held_out
 from skidyn.evidence._broken import without_broken
-from skidyn.evidence._kinematics import half_width, smooth_motion
+from skidyn.evidence._kinematics import half_width, smooth_motion, usual_cutoff
 from skidyn.evidence._rows import (
     FEWEST_SAMPLES,
     WINDOW,
@@ -49,12 +49,15 @@ def read_motion(signals: Signals, smooth: bool, torque: Array) -> Signals:
 def usual_windows(signals: Signals) -> Array:
     """Width of the windows of every segment in s.
 
-    The first zero of their spectrum is at most the cut-off of the smoother: what this removes from
-    the motion would else be left in the rows of the torque.
+    Where the cut-off of the smoother is lowered, it is at least the first zero of their spectrum:
+    what it removes from the motion would else be left in the rows of the torque.
     """
+    widths = np.full(len(signals.segments), WINDOW)
     if signals.cutoff is None:
-        return np.full(len(signals.segments), WINDOW)
-    return np.array([max(WINDOW, 2 / signals.cutoff[r.start]) for r in signals.segments])
+        return widths
+    cutoffs = signals.cutoff[[rows.start for rows in signals.segments]]
+    lowered = cutoffs < usual_cutoff(signals.rate)
+    return np.where(lowered, np.maximum(WINDOW, 2 / cutoffs), widths)
 
 
 def _margins(signals: Signals, reversals: Sequence[int]) -> NDArray[np.int64]:
