@@ -27,8 +27,8 @@ from skidyn.measurement._torque import readable_fits
 WRONG, TIMES, HEAVY = 0.2, 3.0, 0.3
 #: Error of any bodies, as a share of the spread, and in errors of the mean of a row, from which a
 #: torque is nearly unrelated to the motion; or of the stated ones, if others predict no part of the
-#: log from the rest of it better than a constant does.
-UNRELATED, BEYOND = 0.67, 4.0
+#: log from the rest of it better than a constant does, and leave this share even of the whole.
+UNRELATED, BEYOND, FOLLOWED = 0.67, 4.0, 0.5
 #: Least share of it that any function of the position must leave, the fewest parts of a log that
 #: are predicted by the others, and the least share of it that can be.
 LEFT, FEWEST_PARTS, MOSTLY = 0.8, 3, 0.5
@@ -164,7 +164,8 @@ class UnexplainedTorque(Check):
         steady = seen.scatter / np.sqrt(6)  # white noise is not an error of the log
         bad: NDArray[np.bool_] = (least > UNRELATED) & (least > BEYOND * steady)
         held = _held_out(loaded, seen.joints)
-        bad |= (held > 1.0) & (seen.errors[0] > UNRELATED) & (held > BEYOND * steady)
+        unlike_others = (held > 1.0) & (held > BEYOND * steady) & (least > FOLLOWED)
+        bad |= unlike_others & (seen.errors[0] > UNRELATED)
         unlike = [k for k, found in zip(seen.joints, bad, strict=True) if found]
         joints = [k for k in unlike if _left_by_position(seen, k) > LEFT]
         if joints:  # that of another joint may be larger than its own

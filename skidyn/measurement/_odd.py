@@ -9,6 +9,7 @@ from functools import partial
 from itertools import repeat
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn._text import trajectories_told
@@ -297,6 +298,7 @@ def _multiples(seen: Explained) -> list[Multiple]:
     parts = [fits.recording == run for run in runs]
     elsewhere = fits.predicted_without(parts) if apart else repeat({})
     for run, rows, others in zip(runs, parts, elsewhere, strict=False):
+        others = {} if _extrapolated(seen, rows, others) else others
         for k in seen.joints:
             y, use = fits.mean_torque(k)
             y = y[use]
@@ -315,6 +317,23 @@ def _multiples(seen: Explained) -> list[Multiple]:
                 gain /= outcome.inflation_of(k)
                 told.append(Multiple(k, int(run), size, likeness, gain, larger, bool(spoils)))
     return told
+
+
+def _extrapolated(
+    seen: Explained, rows: NDArray[np.bool_], others: dict[int, tuple[Array, float]]
+) -> bool:
+    """Whether the other recordings say too little of the bodies to predict this one.
+
+    Their prediction is then wrong for most joints, which bodies common to all recordings explain.
+    """
+    wrong = []
+    for k, (predicted, scale) in others.items():
+        y, use = seen.fits.mean_torque(k)
+        own = rows[use]
+        error = float(np.sqrt(np.mean((y[use][own] - predicted) ** 2)))
+        common = float(np.sqrt(np.mean(seen.identified.residual[k][own] ** 2)))
+        wrong.append(error > max(LARGER * scale, 2 * common))
+    return len(wrong) > 2 and float(np.mean(wrong)) > 0.5
 
 
 def _multiple(y: Array, predicted: Array, scale: float) -> tuple[float, float, float, float] | None:
