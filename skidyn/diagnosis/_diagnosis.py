@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from skidyn._columns import ColumnSpec
 from skidyn._cores import alone, aside, cores
-from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning
+from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning, SkidynError
 from skidyn._memory import give_back
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
@@ -287,8 +287,13 @@ def _diagnose(
             _check_rows(problem)
             # while the checks run on another core: they rarely change the search
             found = None if alone() else _search(problem, kinds, settings)
-        except Exception:
-            told()  # an error in the log is more informative
+        except Exception as error:
+            try:
+                told()
+            except SkidynError:
+                raise  # an error in the log is more informative
+            except Exception as other:
+                raise error from other  # the checks failed for the same reason
             raise
         checks = told()
     notes = [str(check) for check in checks]

@@ -68,10 +68,10 @@ def held_share(position: np.ndarray, within: np.ndarray, step: float) -> float:
     Returns
     -------
     float
-        0 for a position in coarse steps, which change one by one.
+        0 for a position in coarse steps, which change one by one, and with too few samples.
     """
     moved = np.abs(np.diff(position))
-    if not within.any() or np.ptp(position) == 0:
+    if len(position) <= STRIDE or not within.any() or np.ptp(position) == 0:
         return 0.0
     # motion over several steps, so that rests do not count
     way = np.abs(position[STRIDE:] - position[:-STRIDE])

@@ -152,3 +152,10 @@ def test_the_numbers_of_a_log_are_known_before_its_checks():
     assert not first.checks and quality.checks
     parts = first.motion_table, quality.torque_table, quality.problems
     assert str(quality) == "\n\n".join(parts)
+
+
+@pytest.mark.parametrize("n_rows", [2, 3, 10])
+def test_few_rows_are_enough_for_a_report(n_rows):
+    quality = check_log(PLAIN.iloc[:n_rows], PLANAR)
+    assert quality.n_samples == n_rows
+    assert not any(joint.excited for joint in quality.joints)
