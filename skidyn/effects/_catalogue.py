@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from operator import index
 from typing import Any
 
 from skidyn._exceptions import EffectError
+from skidyn._joint_numbers import joint_numbers
 from skidyn.effects._base import Effect
 from skidyn.effects._coupling import CoupledFriction, CoupledInertia, CouplingSpring
 from skidyn.effects._formula import Formula
@@ -140,9 +140,9 @@ def _kind_and_joints(spec: Any) -> tuple[str, list[int]]:
     """Kind and joints of a pair given by a user."""
     try:
         kind, joints = spec
-        if isinstance(kind, str) and not isinstance(joints, str):
-            return kind, [index(joint) for joint in joints]
-    except (TypeError, ValueError):  # not a pair, or not a list of whole numbers
+        if isinstance(kind, str):
+            return kind, joint_numbers(joints)
+    except (TypeError, ValueError):  # not a pair, or not numbers of joints
         pass
     raise EffectError(
         f"{spec!r} is not an effect; write 'viscous', or ('dahl', [1, 4]) with joints counted from "

@@ -264,6 +264,12 @@ def _measured(frame: pd.DataFrame, robot: Robot | None) -> tuple[Measurement, in
     """The measurement of a log, its number of trajectories, and sentences about omitted rows."""
     from skidyn.measurement import Measurement, count_same_stamps, regular_clock
 
+    if not hasattr(frame, "attrs"):  # of a DataFrame of pandas
+        given = repr(frame) if isinstance(frame, str) else type(frame).__name__
+        raise LogError(
+            f"check_log was given {given}; expected a DataFrame, as of read_log: "
+            "check_log(read_log('log.csv'))."
+        )
     n = count_joints(frame)
     if robot is not None and robot.n_joints != n:
         raise LogError(

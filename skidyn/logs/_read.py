@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -194,9 +194,7 @@ def read_log(
     """
     import pandas
 
-    paths = [path] if isinstance(path, (str, os.PathLike)) else list(path)
-    if not paths:
-        raise LogError("no file to read: the list of paths is empty.")
+    paths = _paths(path)
     _check_mapping("columns", columns, (str, int))
     _check_mapping("units", units, (str,))
     said: list[str] = []
@@ -269,6 +267,24 @@ def read_log(
         for message in (*quality.faults, *told):
             warn_about_log(message)
     return frame
+
+
+def _paths(path: Any) -> list[PathLike]:
+    """One path or several as a list."""
+    if isinstance(path, (str, os.PathLike)):
+        return [path]
+    if hasattr(path, "columns"):
+        raise LogError(
+            "read_log was given a table; expected the path of a log, or several. A table needs no "
+            "reading: pass it as it is, for example to check_log, or save it to a file and read "
+            "that if its columns have other names or units."
+        )
+    several = list(path) if isinstance(path, Iterable) else [path]
+    if not all(isinstance(item, (str, os.PathLike)) for item in several):
+        raise LogError(f"path={path!r}; expected the path of a log, or a list of paths.")
+    if not several:
+        raise LogError("no file to read: the list of paths is empty.")
+    return several
 
 
 def _check_mapping(name: str, value: Any, kinds: tuple[type, ...]) -> None:

@@ -159,3 +159,9 @@ def test_few_rows_are_enough_for_a_report(n_rows):
     quality = check_log(PLAIN.iloc[:n_rows], PLANAR)
     assert quality.n_samples == n_rows
     assert not any(joint.excited for joint in quality.joints)
+
+
+@pytest.mark.parametrize("given", ["log.csv", PLAIN.to_numpy()])
+def test_only_a_table_is_checked(given):
+    with pytest.raises(ValueError, match=r"expected a DataFrame.*check_log\(read_log"):
+        check_log(given)
