@@ -285,6 +285,11 @@ def _diagnose(
         try:
             problem = posed()
             _check_rows(problem)
+            if not torque.any():  # with force: otherwise the checks refuse it
+                raise LogError(
+                    "every torque is zero, so that no effect has a size: the torque was not "
+                    "recorded. Record it, or name the columns that hold it"
+                )
             # while the checks run on another core: they rarely change the search
             found = None if alone() else _search(problem, kinds, settings)
         except Exception as error:

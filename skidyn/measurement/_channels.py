@@ -102,6 +102,28 @@ class CoarseVelocity(Check):
             )
 
 
+class UnrecordedTorque(Check):
+    """Torques of a moving robot none of which ever changes."""
+
+    name = "unrecorded_torque"
+    of_sensor = True
+    suspects = "torque that was not recorded: it is constant on all joints while the robot moves"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        if not measurement.unrecorded:
+            return
+        values = ", ".join(f"{value:.4g}" for value in measurement.torque[0])
+        of = "that of the joint is" if measurement.n_joints == 1 else "those of the joints are"
+        yield self.suspicion(
+            "the torque was not recorded",
+            f"the robot moves, but no torque ever changes: {of} {values} in every row. Record the "
+            "torque or the current of the motors, or name the columns that hold it with --columns "
+            "(in Python: columns=); for position servos, their commands can take its place "
+            "(--controller fit)",
+            "certain",
+        )
+
+
 class ConstantTorque(Check):
     """A torque that never changes: in the log, in a trajectory, or at the ends of trajectories."""
 
@@ -132,7 +154,7 @@ class ConstantTorque(Check):
         lost = measurement.clipped
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
-            if k in lost:
+            if k in lost or measurement.unrecorded:
                 continue  # reported already
             if np.ptp(torque) == 0:
                 yield self.suspicion(

@@ -23,6 +23,7 @@ from skidyn.measurement._channels import (
     ConstantTorque,
     SmoothTorque,
     StillJoint,
+    UnrecordedTorque,
 )
 from skidyn.measurement._check import Check
 from skidyn.measurement._clock import (
@@ -73,6 +74,7 @@ UNSIGNED = UnsignedTorque()
 CHECKS: tuple[Check, ...] = (
     PaddedRows(),
     FailedReads(),
+    UnrecordedTorque(),
     DescriptionLengths(),
     DescriptionUnits(),
     LostRows(),
@@ -203,7 +205,7 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
 
 #: Checks whose certain suspicions make every fit of the robot meaningless, and checks of which any
 #: suspicion does.
-_UNITS = (LostRows, ClockUnit, PositionUnit, Velocity, WrappedPosition)
+_UNITS = (UnrecordedTorque, LostRows, ClockUnit, PositionUnit, Velocity, WrappedPosition)
 _SCALES = (ClockUnit, PositionUnit, TaredTorque)
 
 

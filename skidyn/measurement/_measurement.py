@@ -361,12 +361,17 @@ class Measurement:
         columns = self.torque.T
         return [longest_plateau_share(column, self.signals.segments) for column in columns]
 
+    @property
+    def unrecorded(self) -> bool:
+        """Whether no torque ever changes although the robot moves."""
+        return not np.ptp(self.torque, axis=0).any() and any(self.excited)
+
     @cached_property
     def fits(self) -> Fits | None:
-        """Averaged rows to which readings of the measurement are fitted."""
+        """Averaged rows to which readings are fitted; None without a robot, or without torque."""
         from skidyn.measurement._rows import make_fits  # with it all columns of the evidence
 
-        if self.robot is None:
+        if self.robot is None or self.unrecorded:
             return None
         stuck = [*self.stuck.values(), *self.constant.values()]
         odd = [*self.odd_motion, *(run for runs in stuck for run in runs)]

@@ -4,6 +4,9 @@
 import numpy as np
 import pytest
 
+from skidyn.diagnosis import diagnose
+from skidyn.exceptions import LogError
+from skidyn.identification import RBDRegressor
 from skidyn.logs import check_log, read_log
 
 
@@ -102,3 +105,22 @@ def test_ends_that_were_filled_with_the_last_values_of_all_channels_are_left_out
 
     assert told["constant_torque"].remedy.option == "--drop-repeated"
     assert {check for check, s in told.items() if s.certainty != "noted"} == {"constant_torque"}
+
+
+@pytest.mark.parametrize("value", [0.0, 1.3])
+def test_a_torque_that_never_changes_was_not_recorded(value, arm, recorded):
+    frame = recorded.frame.assign(tau1=value, tau2=-value)
+    for robot in (arm, None):
+        (told,) = check_log(frame, robot).checks
+        assert (told.check, told.certainty, told.remedy) == ("unrecorded_torque", "certain", None)
+    assert "nan" not in str(check_log(frame, arm))
+    with pytest.raises(LogError, match="the torque was not recorded"):
+        diagnose(RBDRegressor(arm), frame, frame[["tau1", "tau2"]])
+    with pytest.raises(LogError, match="every torque is zero"):
+        diagnose(RBDRegressor(arm), frame, np.zeros((len(frame), 2)), force=True)
+
+
+def test_a_torque_that_does_not_change_at_rest_is_not_missing(signals, found):
+    rests = signals.with_(q=0 * signals.q, dq=0 * signals.dq, ddq=0 * signals.dq)
+    told = {s.check: s.certainty for s in found(rests, np.full(rests.q.shape, 1.3))}
+    assert told == {"constant_torque": "suspected", "still_joint": "noted"}
