@@ -83,6 +83,8 @@ def read_log(
         ["pos_a", "pos_b"]}``, ``{"tau": "effort_{joint}"}``, ``{"time": 0}``.
     units : mapping, optional
         Units that are not SI, per quantity or column: ``{"q": "deg", "time": "ms", "q3": "mm"}``.
+        With a robot, that of a quantity applies to the joints that can have it: ``deg`` to turning
+        joints, ``mm`` to sliders.
     drive_gains : sequence of float, N m/A or N/A, optional
         Torque per ampere and joint, to read a log of currents (``i1 .. in``) as torques.
     topics : sequence of str, optional

@@ -20,7 +20,7 @@ from skidyn._checks import (
 )
 from skidyn._exceptions import LogError
 from skidyn._names import NameMatch, match_names
-from skidyn._units import convert_units, refuse_stated_units
+from skidyn._units import convert_units, refuse_stated_units, units_of_joints
 from skidyn.logs._clock import (
     align_channels,
     clocks,
@@ -148,6 +148,8 @@ def _in_si(
         for target, unit in (options.units or {}).items()
         if target in names or target in names.values()
     }
+    if options.robot is not None and options.remedies.order is None:
+        mine = units_of_joints(mine, kept, options.robot, match.notes)
     return convert_units(failed.remove(table[kept]), mine)
 
 
