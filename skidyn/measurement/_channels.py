@@ -35,6 +35,8 @@ class StillJoint(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         q = measurement.signals.q
+        if measurement.shuffled:
+            return  # reversals cannot be told
         for k, moves in enumerate(measurement.excited):
             if not moves:
                 yield self.suspicion(

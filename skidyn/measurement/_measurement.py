@@ -75,7 +75,7 @@ class Measurement:
     same_stamps : int, optional
         Rows that had the time stamp of the previous row although joints moved; ``signals`` then
         have an even clock.
-    late_position, readable, stale, lost, odd, one_zero, dead, scaled, smoothed : optional
+    late_position, readable, stale, lost, shuffled, odd, one_zero, dead, scaled, smoothed : optional
         Results of checks that are used by other checks; set by them.
     computed, frictionless, mixed : optional
         Results of checks that are used by other checks; set by them.
@@ -109,6 +109,7 @@ class Measurement:
     readable: bool = field(default=True, repr=False)
     stale: bool = field(default=False, repr=False)
     lost: bool = field(default=False, repr=False)
+    shuffled: bool = field(default=False, repr=False)
     odd: bool = field(default=False, repr=False)
     one_zero: Division | None = field(default=None, repr=False)
     dead: bool = field(default=False, repr=False)
