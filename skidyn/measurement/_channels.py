@@ -20,9 +20,9 @@ CLIPPED = 0.002
 #: Fourth differences of a torque relative to its spread above which it has noise; joints of
 #: recordings with noise are never below 4e-4.
 NOISELESS = 1e-5
-#: Step of a torque, as a share of its spread, that is suspected; how many times as often as the
-#: value next to it an extreme value of a coarse torque occurs if it is clipped.
-LARGE_STEP, OFTENER = 0.5, 3.0
+#: How many times as often as the value next to it an extreme value of a coarse torque occurs if it
+#: is clipped.
+OFTENER = 3.0
 #: How many times as large a step of a velocity must be as that of differences of the positions.
 COARSER = 2.0
 
@@ -216,15 +216,22 @@ class CoarseTorque(Check):
     suspects = "torque in coarse steps"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        for k, (step, share) in measurement.coarse_torques.items():
-            unit = "N" if measurement.signals.prismatic[k] else "N m"
-            yield self.suspicion(
-                f"the torque of {measurement.joint(k)} comes in coarse steps",
-                f"the steps of {step:.3g} {unit} are {share:.0%} of its standard deviation; "
-                "smaller effects cannot be found on this joint",
-                "suspected" if share > LARGE_STEP else "noted",
-                [k],
-            )
+        coarse = measurement.coarse_torques
+        if not coarse:
+            return
+        told = ", ".join(
+            f"{step:.3g} {'N' if measurement.signals.prismatic[k] else 'N m'} ({share:.0%})"
+            for k, (step, share) in coarse.items()
+        )
+        one = len(coarse) == 1
+        yield self.suspicion(
+            f"the torque of {measurement.joints(coarse)} comes in coarse steps",
+            f"the {'step' if one else 'steps'}, and the share of the standard deviation, "
+            f"{'is' if one else 'are'} {told}; smaller effects cannot be found on "
+            f"{'this joint' if one else 'these joints'}",
+            "noted",  # nothing can be done about a recording of it
+            coarse,
+        )
 
 
 class SmoothTorque(Check):

@@ -42,7 +42,7 @@ FINE = 50
 def channel_step(values: np.ndarray) -> float:
     """Step of a channel with few values, or of a coarse sensor; NaN if it is not coarse."""
     distinct = np.unique(values)
-    if 2 < len(distinct) <= FEW_VALUES:
+    if 2 < len(distinct) <= min(FEW_VALUES, len(values) // 2):  # which recur
         return float(np.median(np.diff(distinct)))
     return step_of_values(distinct)
 

@@ -27,8 +27,16 @@ def test_torque_in_coarse_steps(signals, torque, found):
     step = 0.8 * torque[:, 0].std()
     coarse = np.column_stack([np.round(torque[:, 0] / step) * step, torque[:, 1]])
     told = {s.check: s for s in found(signals, coarse)}
-    assert told["coarse_torque"].joints == (1,) and told["coarse_torque"].certainty == "suspected"
+    assert told["coarse_torque"].joints == (1,) and told["coarse_torque"].certainty == "noted"
     assert "clipped_torque" not in told
+
+
+def test_coarse_torques_are_one_line(signals, torque, found):
+    step = 0.6 * torque.std(axis=0)
+    (told,) = [s for s in found(signals, np.round(torque / step) * step) if "steps" in s.suspicion]
+    assert told.joints == (1, 2) and "shoulder) and joint 2 (elbow)" in told.suspicion
+    assert told.evidence.count("N m (") == 2
+    assert not [s for s in found(signals.take(slice(12)), torque[:12]) if "coarse" in s.check]
 
 
 def test_velocities_in_coarse_steps(signals, torque, found):
@@ -114,7 +122,7 @@ def test_a_torque_that_never_changes_was_not_recorded(value, arm, recorded):
         (told,) = check_log(frame, robot).checks
         assert (told.check, told.certainty, told.remedy) == ("unrecorded_torque", "certain", None)
     assert "nan" not in str(check_log(frame, arm))
-    with pytest.raises(LogError, match="the torque was not recorded"):
+    with pytest.raises(LogError, match="wrong. The torque was not recorded"):
         diagnose(RBDRegressor(arm), frame, frame[["tau1", "tau2"]])
     with pytest.raises(LogError, match="every torque is zero"):
         diagnose(RBDRegressor(arm), frame, np.zeros((len(frame), 2)), force=True)
