@@ -36,7 +36,7 @@ def read_log(
     robot: Robot | None = None,
     columns: ColumnMap | None = None,
     units: Mapping[str, str] | None = None,
-    drive_gains: Sequence[float] | None = None,
+    drive_gains: float | Sequence[float] | None = None,
     topics: Sequence[str] | None = None,
     rate: float | None = None,
     resample_rate: float | None = None,
@@ -85,7 +85,7 @@ def read_log(
         Units that are not SI, per quantity or column: ``{"q": "deg", "time": "ms", "q3": "mm"}``.
         With a robot, that of a quantity applies to the joints that can have it: ``deg`` to turning
         joints, ``mm`` to sliders.
-    drive_gains : sequence of float, N m/A or N/A, optional
+    drive_gains : float or sequence of float, N m/A or N/A, optional
         Torque per ampere and joint, to read a log of currents (``i1 .. in``) as torques.
     topics : sequence of str, optional
         Topics of a bag or groups of an HDF5 file to read; all that hold joint states if None.
