@@ -135,8 +135,8 @@ def diagnose(
     EffectError
         The catalogue has no such effect.
     ValueError
-        ``settings``, ``smooth`` or ``n_jobs`` is invalid, or neither torque nor controller is
-        given.
+        ``model`` is no regressor, ``settings``, ``smooth`` or ``n_jobs`` is invalid, or neither
+        torque nor controller is given.
 
     Examples
     --------
@@ -149,6 +149,11 @@ def diagnose(
     >>> [(finding.kind, finding.joints) for finding in diagnosis.findings]
     [('stribeck', (2,))]
     """
+    if not (hasattr(model, "fit") or hasattr(model, "predict")):
+        raise ValueError(
+            f"model is of type {type(model).__name__}; expected a regressor: diagnose(model, X, "
+            "tau) with for example model=RBDRegressor(robot)"
+        )
     # many small matrices: more threads would only wait for each other
     servos = None
     if tau is None:
@@ -212,7 +217,9 @@ def _diagnose(
     stated = tau
     robot = robot if robot is not None else getattr(model, "robot", None)
     if robot is None:
-        raise ColumnError("this regressor has no robot; pass robot=Robot.from_urdf(...)")
+        raise ColumnError(
+            f"the model, a {type(model).__name__}, has no robot; pass robot=Robot.from_urdf(...)"
+        )
     if not isinstance(robot, Robot):
         robot = Robot.from_urdf(robot)
     signals, torque = read_signals(

@@ -8,6 +8,7 @@ from typing import Any
 
 from skidyn._exceptions import EffectError
 from skidyn._joint_numbers import joint_numbers
+from skidyn._text import joints_of
 from skidyn.effects._base import Effect
 from skidyn.effects._coupling import CoupledFriction, CoupledInertia, CouplingSpring
 from skidyn.effects._formula import Formula
@@ -175,4 +176,4 @@ def _refuse_settings(effect: Effect) -> None:
 def _check_joints(kind: str, joints: Sequence[int], n_joints: int) -> None:
     wrong: list[Any] = [j + 1 for j in joints if not 0 <= j < n_joints]
     if wrong:
-        raise EffectError(f"{kind}: no joint {wrong[0]}; the robot has joints 1 to {n_joints}")
+        raise EffectError(f"{kind}: no joint {wrong[0]}; the robot has {joints_of(n_joints)}")

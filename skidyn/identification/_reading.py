@@ -16,6 +16,7 @@ from skidyn._columns import Columns, ColumnSpec, resolve_columns, trajectory_num
 from skidyn._exceptions import ColumnError
 from skidyn._order import has_one_motion, order_in_time
 from skidyn._signals import Array, Signals, rates_of, refuse_other_gravity, signals_from
+from skidyn._text import counted
 from skidyn._validation import validate_motion
 from skidyn.effects import Term
 from skidyn.evidence import broken_notes, smooth_motion
@@ -63,7 +64,7 @@ class Reading:
         notes = broken_notes(signals, torque, self.robot_.joint_names)
         self._broken = bool(notes)
         for what, where in notes:
-            warn_about_log(f"{what[0].upper()}{what[1:]} {where}.")
+            warn_about_log(f"{what}: {where}.")  # as the checks say it
         return signals, torque, order
 
     def _doubt_trajectories(self, numbers: NDArray[Any], column: int) -> None:
@@ -140,7 +141,7 @@ class Reading:
         n = self.robot_.n_joints
         if torque.shape[1] != n:
             raise ColumnError(
-                f"y has {torque.shape[1]} column(s); the robot has {n} joints "
+                f"y has {torque.shape[1]} column(s); the robot has {counted(n, 'joint')} "
                 f"({', '.join(self.robot_.joint_names)})"
             )
 

@@ -249,7 +249,7 @@ def refuse_certain(found: list[Suspicion]) -> None:
         raise MisreadLogError(
             "the log does not agree with its names and units, so that any effect found in it "
             "would be wrong. "
-            + " ".join(map(str, certain))
+            + " ".join(text[:1].upper() + text[1:] for text in map(str, certain))
             + " To continue anyway: --force (in Python: force=True).",
             certain,
         )

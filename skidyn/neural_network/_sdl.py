@@ -24,6 +24,7 @@ from skidyn._compat import HasMethods, Interval, StrOptions
 from skidyn._keys import Keys
 from skidyn._order import folds_taken, taken, time_order
 from skidyn._signals import Array
+from skidyn._text import counted
 from skidyn._validation import motion_of, validate_motion
 from skidyn.hybrid import TrainingRange, distances, fade, learned_weights
 from skidyn.identification import RBDRegressor
@@ -283,7 +284,7 @@ class SDLRegressor(SequenceRegressor):
         n_targets, n_joints = y[:1].size, self._robot.n_joints
         if n_targets != n_joints:
             raise ValueError(
-                f"y has {n_targets} columns; the robot has {n_joints} joints: "
+                f"y has {n_targets} columns; the robot has {counted(n_joints, 'joint')}: "
                 f"{', '.join(self._robot.joint_names)}."
             )
 

@@ -25,7 +25,7 @@ from skidyn._exceptions import LogError, SkidynError
 from skidyn._joint_numbers import joint_numbers
 from skidyn._progress import track
 from skidyn._signals import Array
-from skidyn._text import inside, measure
+from skidyn._text import inside, joints_of, measure
 from skidyn.effects import get_effect
 from skidyn.forward import Controller, JointLoop, Task, read_task
 from skidyn.simulation._servo_fit import Fit, covariance, fit_all
@@ -243,7 +243,7 @@ def explain_servo_motion(
     wanted = list(range(1, n + 1)) if joints is None else joint_numbers(joints)
     strange = [j for j in wanted if not 1 <= j <= n]
     if strange:
-        raise SkidynError(f"joints={wanted}; the robot has joints 1 to {n}")
+        raise SkidynError(f"joints={wanted}; the robot has {joints_of(n)}")
     task = read_task(model, X, None, controller, PIECE)
     pieces = len(task.windows.rows)
     if pieces < FEWEST_PIECES:
