@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from skidyn._exceptions import LogError, LogWarning
+from skidyn._text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,13 +71,16 @@ def require_columns(
         missing = sorted(set(range(1, n_joints + 1)) - found)
         surplus = sorted(found - set(range(1, n_joints + 1)))
         if missing:
+            needed = (
+                f"needs {quantity}1" if n_joints == 1 else f"need {quantity}1..{quantity}{n_joints}"
+            )
             servos = (
                 " For position servos, their commands (cmd1..) can take the place of torque: "
                 "skidyn diagnose --controller fit; in Python needs_torque=False and servo_torque."
             )
             raise LogError(
-                f"{source} lacks {', '.join(f'{quantity}{k}' for k in missing)}: {n_joints} joints "
-                f"need {quantity}1..{quantity}{n_joints}. It has: {', '.join(names)}."
+                f"{source} lacks {', '.join(f'{quantity}{k}' for k in missing)}: "
+                f"{counted(n_joints, 'joint')} {needed}. It has: {', '.join(names)}."
                 f"{servos if quantity == 'tau' and not found else ''}"
             )
         if surplus:
@@ -148,13 +152,22 @@ def handle_missing(
         f"{source}: {int(bad.sum())} of {len(frame)} rows hold NaN or infinite values ({told}; "
         f"first in row {int(np.argmax(bad))})."
     )
-    if missing == "error":
+    if "time" in names and not finite[:, list(names).index("time")].any():
+        raise LogError(
+            f"{message} No row has a time: state the sampling rate with --rate (in Python: "
+            "rate=...), or name another column with --columns time=NAME (in Python: "
+            "columns={'time': NAME})."
+        )
+    if missing == "error" and not bad.all():
         raise LogError(
             f"{message} Fix them, or leave these rows out with --missing drop (in Python: "
             "missing='drop'); derivatives and filters then do not cross the gaps."
         )
     if bad.all():
-        raise LogError(f"{message} No row is left.")
+        raise LogError(
+            f"{message} No row is left; fix them, or leave out the columns without values with "
+            "--columns (in Python: columns=...)."
+        )
     notes.append(
         f"missing: {int(bad.sum())} of {len(frame)} rows with NaN or infinite values were left out"
     )

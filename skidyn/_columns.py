@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from skidyn._exceptions import ColumnError
-from skidyn._text import suggest
+from skidyn._text import counted, suggest
 
 #: Key column of an estimator: by position, by name, found automatically, or absent.
 ColumnSpec = int | str | None
@@ -97,11 +97,11 @@ def resolve_columns(
     if len(rest) != 3 * n:
         keys = n_features - len(rest)
         raise ColumnError(
-            f"X has {n_features} columns; a robot with {n} joints needs {3 * n} by position (q, "
-            f"dq, ddq of {', '.join(joint_names)}) and {keys} key column(s) are declared. Pass a "
-            "DataFrame with the columns q1.., dq1.., ddq1.. (a Pipeline passes one on after "
-            "set_output(transform='pandas')), or declare key columns by position, for example "
-            "trajectory=0."
+            f"X has {n_features} columns; a robot with {counted(n, 'joint')} needs {3 * n} by "
+            f"position (q, dq, ddq of {', '.join(joint_names)}) and {keys} key column(s) are "
+            "declared. Pass a DataFrame with the columns q1.., dq1.., ddq1.. (a Pipeline passes "
+            "one on after set_output(transform='pandas')), or declare key columns by position, "
+            "for example trajectory=0."
         )
     return Columns(
         tuple(rest[:n]), tuple(rest[n : 2 * n]), tuple(rest[2 * n :]), key_trajectory, key_time

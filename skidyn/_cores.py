@@ -153,12 +153,11 @@ def aside(function: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
 
     The block gets a function that waits for the result and returns it, or raises its exception. The
     result must be picklable, and side effects are lost. With one core it is computed at once,
-    before the block.
+    before the block, which gets its exception as well only when it asks for the result.
     """
     child = None if alone() else _started(lambda: _Boxed(function()))
     if child is None:
-        value = function()
-        yield lambda: value
+        yield _outcome_of(function)
         return
     token = _ASIDE.set((*_ASIDE.get(), child))
     try:
@@ -174,6 +173,20 @@ def aside(function: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
     finally:
         _ASIDE.reset(token)
         child.end()
+
+
+def _outcome_of(function: Callable[[], Result]) -> Callable[[], Result]:
+    """Call a function, and return one that returns its result or raises its exception."""
+    try:
+        value = function()
+    except Exception as error:
+        failure = error
+
+        def fails() -> Result:
+            raise failure
+
+        return fails
+    return lambda: value
 
 
 class _Boxed(Generic[Result]):

@@ -11,7 +11,7 @@ from typing import Any
 
 from skidyn._exceptions import LogError
 from skidyn._limits import LONGEST_NAME, MOST_COLUMNS
-from skidyn._text import suggest
+from skidyn._text import counted, suggest
 from skidyn._units import split_unit
 
 #: A joint number above this and above the number of columns is a damaged name: a list of that many
@@ -110,11 +110,11 @@ def match_names(
     n = _number_of_joints(match)
     if robot_joints is not None and n and n != len(robot_joints):
         raise LogError(
-            f"{source} has {n} joints ({_listed(match.joint_names) or 'by number'}), the robot has "
-            f"{len(robot_joints)} ({_listed(robot_joints)}). If the log covers part of the robot, "
-            "load it with Robot.from_urdf(..., joints=[...]); if it has further joints, select "
-            "the columns with columns={'q': [...], 'dq': [...], 'tau': [...]}. On the command "
-            "line: --joints NAME,..; --columns 'q=...{i},dq=...{i},tau=...{i}'."
+            f"{source} has {counted(n, 'joint')} ({_listed(match.joint_names) or 'by number'}), "
+            f"the robot has {len(robot_joints)} ({_listed(robot_joints)}). If the log covers part "
+            "of the robot, load it with Robot.from_urdf(..., joints=[...]); if it has further "
+            "joints, select the columns with columns={'q': [...], 'dq': [...], 'tau': [...]}. On "
+            "the command line: --joints NAME,..; --columns 'q=...{i},dq=...{i},tau=...{i}'."
         )
     if n > max(len(names), MANY_JOINTS):
         raise LogError(

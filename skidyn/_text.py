@@ -138,6 +138,24 @@ def measure(name: str, value: object, unit: str = "") -> str:
     return f"{name} = {text.replace('-', '−')}{'' if unit in ('', '1') else f' {raised(unit)}'}"
 
 
+def counted(n: int, noun: str) -> str:
+    """A number of things.
+
+    >>> counted(1, "joint"), counted(6, "joint")
+    ('1 joint', '6 joints')
+    """
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
+def joints_of(n: int) -> str:
+    """Numbers of all joints of a robot.
+
+    >>> joints_of(1), joints_of(6)
+    ('joint 1', 'joints 1 to 6')
+    """
+    return "joint 1" if n == 1 else f"joints 1 to {n}"
+
+
 def suggest(word: object, names: Iterable[str], cutoff: float = 0.6) -> str:
     """Suggestion of a similar name for the end of a message; empty without one.
 

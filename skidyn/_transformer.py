@@ -40,7 +40,7 @@ class LogTransformer(TransformerMixin, BaseEstimator):
         self : object
             The fitted transformer.
         """
-        self._learn(validate_data(self, X, dtype=np.float64))
+        self._learn(validate_data(self, self._table(X), dtype=np.float64))
         return self
 
     def transform(self, X: Any) -> Array:
@@ -57,7 +57,7 @@ class LogTransformer(TransformerMixin, BaseEstimator):
             The same number of rows, with the columns of :meth:`get_feature_names_out`.
         """
         check_is_fitted(self)
-        return self._changed(validate_data(self, X, reset=False, dtype=np.float64))
+        return self._changed(validate_data(self, self._table(X), reset=False, dtype=np.float64))
 
     def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
         """Names of the columns that :meth:`transform` returns.
@@ -75,6 +75,10 @@ class LogTransformer(TransformerMixin, BaseEstimator):
         check_is_fitted(self)
         names = _check_feature_names_in(self, input_features)
         return np.asarray(self._renamed(names), dtype=object)
+
+    def _table(self, X: Any) -> Any:
+        """The columns that are read."""
+        return X
 
     def _learn(self, X: Array) -> None:
         """Set fitted attributes."""

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,12 +14,16 @@ from skidyn._exceptions import LogError
 if TYPE_CHECKING:
     import pandas as pd
 
+    from skidyn.robots import Robot
+
 _ANGLE = {"rad": 1.0, "deg": np.pi / 180, "rev": 2 * np.pi, "mrad": 1e-3}
 _LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2}
 _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 _TORQUE = {"Nm": 1.0, "N m": 1.0, "N*m": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "Nmm": 1e-3, "kNm": 1e3}
 _FORCE = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
 _MOTION = {**_ANGLE, **_LENGTH}
+#: Quantities that are angles of turning joints and lengths of sliding ones, or their rates.
+_OF_MOTION = ("q", "dq", "ddq", "cmd")
 #: Factor to SI of each unit, per quantity. Temperatures are treated separately (they have offsets).
 FACTORS: dict[str, dict[str, float]] = {
     "q": _MOTION,
@@ -90,6 +94,52 @@ def refuse_stated_units(
             f"{source}: {example}; a log is in SI units. To convert it, pass units={wanted} "
             f"(--units {','.join(map('='.join, wanted.items()))} on the command line)."
         )
+
+
+def units_of_joints(
+    units: Mapping[str, str], columns: Sequence[str], robot: Robot, notes: list[str]
+) -> dict[str, str]:
+    """Units for the columns of joints that can have them: angles of turning, lengths of sliders.
+
+    The unit of a quantity is that of its columns with such joints, which is appended to ``notes``
+    where others keep SI units. A LogError is raised for a column with a joint of the other kind,
+    or a quantity without any of its kind.
+    """
+    slides = [kind == "prismatic" for kind in robot.joint_types]
+    own: dict[str, str] = {}
+    for target, unit in units.items():
+        quantity = target.rstrip("0123456789")
+        length = unit.split("/")[0] in _LENGTH
+        if quantity not in _OF_MOTION or FACTORS[quantity].get(unit, 1.0) == 1.0:
+            own[target] = unit
+            continue
+        named = (
+            [target] if target in columns else [f"{quantity}{k + 1}" for k in range(len(slides))]
+        )
+        named = [
+            name for name in named if name in columns and (name == target or name not in units)
+        ]
+        joints = [int(name[len(quantity) :]) - 1 for name in named]
+        other = [k for k in joints if k < len(slides) and slides[k] != length]
+        if not other:
+            own[target] = unit
+            continue
+        names = ", ".join(f"{quantity}{k + 1} ({robot.joint_names[k]})" for k in other)
+        verb = "slides" if len(other) == 1 else "slide"
+        verb = verb if not length else verb.replace("slide", "turn")
+        if len(other) == len(joints):
+            per = "/".join(["", *unit.split("/")[1:]])
+            right = ", ".join(f"{word}{per}" for word in (_ANGLE if length else _LENGTH))
+            raise LogError(
+                f"units: {unit!r} is no unit of {names}, which {verb}; use one of {right}, or "
+                "leave it out."
+            )
+        own |= {f"{quantity}{k + 1}": unit for k in joints if k not in other}
+        notes.append(
+            f"units: {unit} was not applied to {names}, which {verb}; if a unit of "
+            f"{'angles' if length else 'lengths'} is needed, give it by column"
+        )
+    return own
 
 
 def convert_units(frame: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame:

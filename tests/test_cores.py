@@ -94,12 +94,12 @@ def test_something_is_computed_beside_the_block(n_jobs):
         assert nothing() is None
 
 
-@several
-def test_an_error_beside_the_block_waits_for_the_question():
+@pytest.mark.parametrize("n_jobs", [1, pytest.param(2, marks=several)])
+def test_an_error_beside_the_block_waits_for_the_question(n_jobs):
     def fails():
         raise KeyError("lost")
 
-    with cores(2), aside(fails) as found, pytest.raises(KeyError, match="lost"):
+    with cores(n_jobs), aside(fails) as found, pytest.raises(KeyError, match="lost"):
         found()
 
 

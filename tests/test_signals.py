@@ -49,7 +49,8 @@ def table(**columns):
 
 
 def diagnosed(X):
-    return diagnose(RBDRegressor(load_planar_arm()), X, np.ones((len(X), 2)), effects=["spring"])
+    torque = np.random.default_rng(0).normal(1.0, 0.1, (len(X), 2))
+    return diagnose(RBDRegressor(load_planar_arm()), X, torque, effects=["spring"])
 
 
 def test_refuses_to_invent_accelerations():

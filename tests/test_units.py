@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from skidyn.datasets import load_scara, make_hidden_effect_log
 from skidyn.exceptions import LogError, LogWarning
 from skidyn.logs import read_log
 
@@ -58,3 +59,26 @@ def test_a_clock_whose_name_ends_in_its_unit(tmp_path, name):
         read_log(tmp_path / "log.csv", check=False)
     frame = read_log(tmp_path / "log.csv", units={"time": "ms"}, check=False)
     np.testing.assert_allclose(frame["time"], [0.0, 0.01, 0.02])
+
+
+@pytest.fixture
+def lift(saved):
+    """A log of a SCARA, whose third joint slides, with angles in degrees."""
+    frame = make_hidden_effect_log(load_scara(), None, n_trajectories=1, duration=1.0).frame
+    turning = [f"{quantity}{k}" for quantity in ("q", "dq") for k in (1, 2, 4)]
+    return frame, saved(frame.assign(**{name: np.rad2deg(frame[name]) for name in turning}))
+
+
+def test_degrees_are_those_of_turning_joints(lift):
+    frame, path = lift
+    units = {"q": "deg", "dq": "deg/s"}
+    log = quiet_read(path, robot=load_scara(), units=units, check=False)
+    np.testing.assert_allclose(log.filter(regex="^d?q"), frame.filter(regex="^d?q"), atol=1e-6)
+    assert any("deg was not applied to q3 (" in note for note in log.attrs["notes"])
+
+
+@pytest.mark.parametrize("units", [{"q3": "deg"}, {"q1": "mm"}, {"dq3": "deg/s"}])
+def test_a_unit_that_a_joint_cannot_have_is_refused_with_its_name(lift, units):
+    (target,) = units
+    with pytest.raises(LogError, match=rf"is no unit of {target} \(.*use one of"):
+        read_log(lift[1], robot=load_scara(), units=units)

@@ -39,6 +39,9 @@ class Spoiled:
     def is_right(self, told: Suspicion) -> bool:
         """Whether the right check has the right remedy, on the right joints."""
         remedy = told.remedy.option if told.remedy else ""
+        if told.suspicion.startswith("either "):  # its evidence states the option of one cause
+            options = (option for option in (self.option, *self.equivalent) if option)
+            remedy = next((option for option in options if option in told.evidence), "")
         if told.check in self.checks and remedy in self.equivalent:
             return True
         joints = self.joints is None or set(told.joints) == set(self.joints)

@@ -30,6 +30,18 @@ if TYPE_CHECKING:
 _Read = TypeVar("_Read")
 #: Remedies that are numbers by column, and those that are passed on as they are.
 NUMBERS = ("gain", "zero", "late", "lowpass")
+#: Values of options for messages.
+_EXAMPLES = {
+    "units": "q=deg,time=ms",
+    "drive-gains": "'[0.62, 0.5]' (one number for each joint)",
+    "columns": "'q=pos_{i},tau=effort_{i}'",
+    "gain": "tau3=0.02",
+    "zero": "q2=1.57",
+    "late": "tau=0.008",
+    "lowpass": "tau=0.04",
+    "combine": "tau6=tau6+tau7,tau7=tau6-tau7",
+    "summed": "q3=q2",
+}
 AS_GIVEN = (
     "unwrap", "torque_sign", "clock", "drop_repeated", "split_leaps", "restore_gravity", "missing",
 )  # fmt: skip
@@ -159,7 +171,8 @@ def pairs(name: str, text: str | None, numbers: bool = False) -> Any:
     for word in listed(text):
         key, equals, value = (part.strip() for part in word.partition("="))
         if not equals or not key or not value:
-            raise SkidynError(f"--{name} {text}: {word!r} is not NAME=VALUE")
+            hint = f", for example --{name} {_EXAMPLES[name]}" if name in _EXAMPLES else ""
+            raise SkidynError(f"--{name} {text}: {word!r} is not NAME=VALUE{hint}")
         if numbers and key in said:  # successive checks may each find a part
             said[key] = _both(name, said[key], number(name, value))
         else:
@@ -277,7 +290,9 @@ def json_option(name: str, text: str | None) -> Any:
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise SkidynError(f"--{name} is not JSON: {error}") from None
+        example = _EXAMPLES.get(name)
+        hint = f"; expected for example --{name} {example}" if example else ""
+        raise SkidynError(f"--{name} {text} is not JSON: {error}{hint}") from None
 
 
 def joint_numbers(text: str | None) -> list[int] | None:
@@ -294,6 +309,11 @@ def recorded_options(options: argparse.Namespace) -> argparse.Namespace:
 
     Files of the report are searched in its own folder, then in the working directory.
     """
+    if not Path(options.report).is_file():
+        raise SkidynError(
+            f"no file {options.report}; --from must name a report of skidyn diagnose, as written "
+            "by --out report.json"
+        )
     try:
         report = json.loads(Path(options.report).read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:

@@ -12,12 +12,13 @@ from scipy import linalg
 from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.parallel import Parallel, delayed
-from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
+from sklearn.utils.validation import _check_sample_weight, check_is_fitted
 from threadpoolctl import threadpool_limits
 
 from skidyn._columns import ColumnSpec
 from skidyn._compat import Interval, StrOptions, fit_context
 from skidyn._keys import fitted_keys
+from skidyn._validation import validate_motion
 from skidyn.preprocessing import scaling_of
 
 Array = NDArray[Any]
@@ -192,7 +193,7 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
         return self._learn(X, y, sample_weight, first=not hasattr(self, "coef_"))
 
     def _learn(self, X: Any, y: Any, sample_weight: Any, first: bool) -> ELMCommittee:
-        X, y = validate_data(
+        X, y = validate_motion(
             self, X, y, reset=first, multi_output=True, y_numeric=True, dtype=np.float64
         )
         weight = _check_sample_weight(sample_weight, X, dtype=np.float64)
@@ -285,7 +286,7 @@ class ELMCommittee(MultiOutputMixin, RegressorMixin, BaseEstimator):
             Standard deviation over the members; only with ``return_std=True``.
         """
         check_is_fitted(self)
-        X = validate_data(self, X, reset=False, dtype=np.float64)
+        X = validate_motion(self, X, reset=False, dtype=np.float64)
         scaled = self._scaled(X[:, list(fitted_keys(self).features)])
         members = np.stack(
             Parallel(n_jobs=self.n_jobs, prefer="threads")(

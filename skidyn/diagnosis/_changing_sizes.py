@@ -67,12 +67,11 @@ def changing_size(
 
     rest = others(n)
     mean, average = others(own) / rest, others(level) / rest
-    spread = np.maximum(others(square) - rest * mean**2, 0.0)
+    squares = others(square)
+    spread = np.maximum(squares - rest * mean**2, 0.0)
     slope = others(along) - rest * mean * average
-    varies = spread > CONSTANT * np.maximum(others(square), 1e-300)
-    everywhere = spread.sum(axis=0, keepdims=True)
-    common = slope.sum(axis=0, keepdims=True) / np.maximum(everywhere, 1e-300)
-    apart = np.where(varies, slope / np.where(varies, spread, 1.0), 0.0)
+    apart = _sizes(slope, spread, squares)
+    common = _sizes(*(x.sum(axis=0, keepdims=True) for x in (slope, spread, squares)))
 
     def left(size: Array) -> Array:
         """Squared error of each held-out quarter, (recordings * quarters, k)."""
@@ -86,3 +85,9 @@ def changing_size(
     if not predictable(before[:, best], after[:, best]):
         return None
     return (functions[best],), len(functions)
+
+
+def _sizes(slope: Array, spread: Array, square: Array) -> Array:
+    """Coefficients of functions, 0 for those whose spread is only the rounding of their squares."""
+    varies = spread > CONSTANT * np.maximum(square, 1e-300)
+    return np.where(varies, slope / np.where(varies, spread, 1.0), 0.0)

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from skidyn._columns import ColumnSpec
 from skidyn._cores import alone, aside, cores
-from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning
+from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning, SkidynError
 from skidyn._memory import give_back
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
@@ -135,8 +135,8 @@ def diagnose(
     EffectError
         The catalogue has no such effect.
     ValueError
-        ``settings``, ``smooth`` or ``n_jobs`` is invalid, or neither torque nor controller is
-        given.
+        ``model`` is no regressor, ``settings``, ``smooth`` or ``n_jobs`` is invalid, or neither
+        torque nor controller is given.
 
     Examples
     --------
@@ -149,6 +149,11 @@ def diagnose(
     >>> [(finding.kind, finding.joints) for finding in diagnosis.findings]
     [('stribeck', (2,))]
     """
+    if not (hasattr(model, "fit") or hasattr(model, "predict")):
+        raise ValueError(
+            f"model is of type {type(model).__name__}; expected a regressor: diagnose(model, X, "
+            "tau) with for example model=RBDRegressor(robot)"
+        )
     # many small matrices: more threads would only wait for each other
     servos = None
     if tau is None:
@@ -212,7 +217,9 @@ def _diagnose(
     stated = tau
     robot = robot if robot is not None else getattr(model, "robot", None)
     if robot is None:
-        raise ColumnError("this regressor has no robot; pass robot=Robot.from_urdf(...)")
+        raise ColumnError(
+            f"the model, a {type(model).__name__}, has no robot; pass robot=Robot.from_urdf(...)"
+        )
     if not isinstance(robot, Robot):
         robot = Robot.from_urdf(robot)
     signals, torque = read_signals(
@@ -285,10 +292,20 @@ def _diagnose(
         try:
             problem = posed()
             _check_rows(problem)
+            if not torque.any():  # with force: otherwise the checks refuse it
+                raise LogError(
+                    "every torque is zero, so that no effect has a size: the torque was not "
+                    "recorded. Record it, or name the columns that hold it"
+                )
             # while the checks run on another core: they rarely change the search
             found = None if alone() else _search(problem, kinds, settings)
-        except Exception:
-            told()  # an error in the log is more informative
+        except Exception as error:
+            try:
+                told()
+            except SkidynError:
+                raise  # an error in the log is more informative
+            except Exception as other:
+                raise error from other  # the checks failed for the same reason
             raise
         checks = told()
     notes = [str(check) for check in checks]

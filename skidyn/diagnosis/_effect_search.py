@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, clone
 from sklearn.utils.metaestimators import available_if
-from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
+from sklearn.utils.validation import _check_sample_weight, check_is_fitted
 
 from skidyn._columns import column_names
 from skidyn._exceptions import SkidynError
 from skidyn._keys import keys_of
 from skidyn._signals import Array
+from skidyn._validation import motion_of, validate_motion
 from skidyn.diagnosis._correction import is_physics, open_model, weights_of_fit
 from skidyn.diagnosis._diagnosis import diagnose
 from skidyn.diagnosis._faded import FadingCorrection, step_scores
@@ -177,7 +178,7 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
         for name in ("refit", "fade_out"):
             if not isinstance(getattr(self, name), bool | np.bool_):
                 raise ValueError(f"{name}={getattr(self, name)!r}; expected True or False")
-        array, torque = validate_data(
+        array, torque = validate_motion(
             self, X, y, multi_output=True, y_numeric=True, dtype=np.float64
         )
         if sample_weight is not None:
@@ -299,15 +300,15 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
             Predicted torque.
         """
         check_is_fitted(self)
-        array = validate_data(self, X, reset=False, dtype=np.float64)
+        array = validate_motion(self, X, reset=False, dtype=np.float64)
         model = getattr(self, "fading_", self.best_estimator_)
         return np.asarray(model.predict(self._table(X, array)))
 
     # Two hooks that the common tests replace, because their rows have any width and are no motion.
 
     def _table(self, X: Any, array: Array) -> Any:
-        """X as given if its columns have names, else as an array."""
-        return array if column_names(X) is None else X
+        """The motion as given if the columns of X have names, else as an array."""
+        return array if column_names(X) is None else motion_of(self, X)
 
     def _log(self, X: Any, torque: Array, weight: Array | None) -> tuple[Any, Array, Array | None]:
         """The log that is searched."""

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from skidyn._exceptions import EffectError, SkidynError
+from skidyn._joint_numbers import joint_numbers
 from skidyn._signals import Array
 from skidyn.diagnosis._comparison import REGIMES, Comparison, error_map
 from skidyn.diagnosis._correction import CorrectedRegressor, Opened, is_physics
@@ -412,7 +413,7 @@ class Diagnosis:
         """
         return None if self.in_turn is None else self.in_turn.together
 
-    def add(self, kind: str, joints: Sequence[int] | None = None) -> Any:
+    def add(self, kind: str, joints: int | Sequence[int] | None = None) -> Any:
         """Add an effect to the model and fit it again.
 
         Parameters
@@ -421,7 +422,7 @@ class Diagnosis:
             Kind of the catalogue; ``"unknown"`` for the unknown function that was found, or
             ``"formula"`` for the formula proposed for it. A setting of the servo that was found is
             added to the controller: the model is fitted to the torque of the servo with it.
-        joints : sequence of int, optional
+        joints : int or sequence of int, optional
             Joints, counted from 1; by default those of the finding of this kind, or all joints.
 
         Returns
@@ -434,17 +435,20 @@ class Diagnosis:
         EffectError
             Unknown kind, a joint that the robot lacks, no formula was proposed, or no such setting
             of a servo was found.
+        SkidynError
+            ``joints`` is not a number, or several.
         """
+        joints = None if joints is None else joint_numbers(joints)
         if kind == "formula":
             return self._refitted(self._formulas(joints))
         if kind != "unknown" and get_effect(kind).of_servo:
             return self._with_setting(kind, joints)
-        wanted = None if joints is None else set(map(int, joints))
+        wanted = None if joints is None else set(joints)
         found = [t for f in self.findings if f.kind == kind for t in f.terms]
         terms = [t for t in found if wanted is None or len(t.joints) > 1 or set(t.joints) <= wanted]
         if terms and (wanted is None or wanted <= {j for t in terms for j in t.joints}):
             return self._refitted(dict.fromkeys(terms))
-        spec: Any = kind if joints is None else (kind, list(joints))
+        spec: Any = kind if joints is None else (kind, joints)
         return self._refitted(make_terms([spec], len(self.joint_names)))
 
     def _with_setting(self, kind: str, joints: Sequence[int] | None) -> Any:

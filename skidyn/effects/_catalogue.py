@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from operator import index
 from typing import Any
 
 from skidyn._exceptions import EffectError
+from skidyn._joint_numbers import joint_numbers
+from skidyn._text import joints_of
 from skidyn.effects._base import Effect
 from skidyn.effects._coupling import CoupledFriction, CoupledInertia, CouplingSpring
 from skidyn.effects._formula import Formula
@@ -140,9 +141,9 @@ def _kind_and_joints(spec: Any) -> tuple[str, list[int]]:
     """Kind and joints of a pair given by a user."""
     try:
         kind, joints = spec
-        if isinstance(kind, str) and not isinstance(joints, str):
-            return kind, [index(joint) for joint in joints]
-    except (TypeError, ValueError):  # not a pair, or not a list of whole numbers
+        if isinstance(kind, str):
+            return kind, joint_numbers(joints)
+    except (TypeError, ValueError):  # not a pair, or not numbers of joints
         pass
     raise EffectError(
         f"{spec!r} is not an effect; write 'viscous', or ('dahl', [1, 4]) with joints counted from "
@@ -175,4 +176,4 @@ def _refuse_settings(effect: Effect) -> None:
 def _check_joints(kind: str, joints: Sequence[int], n_joints: int) -> None:
     wrong: list[Any] = [j + 1 for j in joints if not 0 <= j < n_joints]
     if wrong:
-        raise EffectError(f"{kind}: no joint {wrong[0]}; the robot has joints 1 to {n_joints}")
+        raise EffectError(f"{kind}: no joint {wrong[0]}; the robot has {joints_of(n_joints)}")

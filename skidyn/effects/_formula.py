@@ -13,6 +13,7 @@ import numpy as np
 
 from skidyn._exceptions import EffectError
 from skidyn._signals import Array, Signals
+from skidyn._text import joints_of
 from skidyn.effects._base import Effect
 from skidyn.effects._parameters import Coefficient
 from skidyn.effects._term import Term
@@ -176,6 +177,6 @@ def _joint(number: str, signals: Signals, text: str) -> int:
     joint = int(number) - 1
     if joint >= signals.n_joints:
         raise EffectError(
-            f"formula {text!r}: no joint {number}; the robot has joints 1 to {signals.n_joints}"
+            f"formula {text!r}: no joint {number}; the robot has {joints_of(signals.n_joints)}"
         )
     return joint

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from skidyn._exceptions import EffectError
+from skidyn._text import suggest
 from skidyn.effects._base import Effect
 
 _EFFECTS: dict[str, Effect] = {}
@@ -53,7 +54,10 @@ def get_effect(kind: str) -> Effect:
     try:
         return _EFFECTS[kind]
     except KeyError:
-        raise EffectError(f"no effect {kind!r}; the catalogue has {', '.join(_EFFECTS)}") from None
+        raise EffectError(
+            f"no effect {kind!r}{suggest(kind, list_effects())}; skidyn effects lists all of them "
+            "(in Python: skidyn.effects.list_effects())"
+        ) from None
 
 
 def searched_kinds() -> list[str]:

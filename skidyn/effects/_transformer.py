@@ -16,6 +16,7 @@ from skidyn._keys import Keys, resolve_keys
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, signals_from
 from skidyn._transformer import LogTransformer
+from skidyn._validation import motion_of
 from skidyn.effects._catalogue import make_terms
 from skidyn.effects._term import Term
 
@@ -72,6 +73,9 @@ class FrictionTransformer(LogTransformer):
         self.n_joints = n_joints
         self.trajectory = trajectory
         self.time = time
+
+    def _table(self, X: Any) -> Any:
+        return motion_of(self, X)
 
     def _learn(self, X: Array) -> None:
         self.columns_ = self._resolve(X.shape[1])

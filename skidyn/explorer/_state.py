@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from skidyn._exceptions import EffectError
 from skidyn._signals import Array, read_signals
+from skidyn._text import joints_of
 from skidyn.diagnosis import Candidate, catalogue_candidates, noise_level, own_terms
 from skidyn.effects import Term, TermSum, searched_kinds
 from skidyn.evidence import make_problem
@@ -122,7 +123,7 @@ class State:
 
     def _joint(self, joint: int) -> int:
         if not 1 <= joint <= self.robot.n_joints:
-            raise EffectError(f"no joint {joint}; the robot has joints 1 to {self.robot.n_joints}")
+            raise EffectError(f"no joint {joint}; the robot has {joints_of(self.robot.n_joints)}")
         return joint - 1
 
     def _check_trajectory(self, trajectory: int) -> None:

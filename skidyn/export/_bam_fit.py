@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 from skidyn._columns import names_of_table, resolve_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import signals_from
+from skidyn._text import counted
 from skidyn.evidence import smooth_motion
 from skidyn.export._bam import (
     BamModel,
@@ -94,7 +95,7 @@ def fit_bam(
     torque = np.asarray(y, dtype=float).reshape(len(q), -1)
     if torque.shape[1] != robot.n_joints:
         raise SkidynError(
-            f"y has {torque.shape[1]} column(s); the robot has {robot.n_joints} joints"
+            f"y has {torque.shape[1]} column(s); the robot has {counted(robot.n_joints, 'joint')}"
         )
     whole = np.isfinite(torque[:, j]) & np.isfinite(np.hstack([q, dq, ddq])).all(axis=1)
     rows = np.flatnonzero(whole & (np.abs(dq[:, j]) > _RESTS))

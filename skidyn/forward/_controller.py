@@ -11,6 +11,7 @@ import numpy as np
 from skidyn._columns import command_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
+from skidyn._text import joints_of
 
 #: Settings of which every joint may have its own.
 PER_JOINT = ("stiffness", "damping", "limit", "deadband", "offset", "no_load_speed")
@@ -129,7 +130,7 @@ class Controller:
         array([inf, 1.5])
         """
         if not 1 <= joint <= n_joints:
-            raise SkidynError(f"no joint {joint}; the robot has joints 1 to {n_joints}")
+            raise SkidynError(f"no joint {joint}; the robot has {joints_of(n_joints)}")
         strange = sorted(set(settings) - set(PER_JOINT))
         if strange:
             raise SkidynError(

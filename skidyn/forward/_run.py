@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from skidyn._columns import column_names, command_columns, names_of_table, resolve_columns
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array, Signals, rates_of, signals_from
+from skidyn._text import counted
 from skidyn.evidence import smooth_motion
 from skidyn.forward._controller import Controller
 from skidyn.forward._model import Conditions, ForwardModel
@@ -64,7 +65,9 @@ def read_task(
     if controller is None:
         torque = np.asarray(y, dtype=float).reshape(len(signals.q), -1)
         if torque.shape[1] != n:
-            raise SkidynError(f"y has {torque.shape[1]} column(s); the robot has {n} joints")
+            raise SkidynError(
+                f"y has {torque.shape[1]} column(s); the robot has {counted(n, 'joint')}"
+            )
         _refuse_gaps(torque, "torques")
         return Task(signals, windows, torque)
     return commanded(signals, windows, controller, references(X, model.robot_))

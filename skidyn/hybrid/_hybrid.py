@@ -17,7 +17,6 @@ from sklearn.utils.validation import (
     _check_sample_weight,
     check_is_fitted,
     has_fit_parameter,
-    validate_data,
 )
 
 from skidyn._columns import ColumnSpec, column_names
@@ -30,6 +29,7 @@ from skidyn._compat import (
     fit_progress,
 )
 from skidyn._keys import fitted_keys
+from skidyn._validation import motion_of, validate_motion
 from skidyn.hybrid._gate import learned_weights
 from skidyn.hybrid._own_joint import OwnJointRegressor
 from skidyn.hybrid._range import TrainingRange, distances, fade
@@ -170,10 +170,10 @@ class HybridRegressor(
         self : object
             The fitted hybrid.
         """
-        array, torque = validate_data(
+        array, torque = validate_motion(
             self, X, y, multi_output=True, y_numeric=True, dtype=np.float64
         )
-        table = _like(X, array)
+        table = self._table(X, array)
         self._one_dimensional = torque.ndim == 1
         weight = None
         if sample_weight is not None:
@@ -262,8 +262,8 @@ class HybridRegressor(
             Predicted torque.
         """
         check_is_fitted(self)
-        array = validate_data(self, X, reset=False, dtype=np.float64)
-        table = _like(X, array)
+        array = validate_motion(self, X, reset=False, dtype=np.float64)
+        table = self._table(X, array)
         physics = self.physics_.predict(fitted_keys(self).for_learner(table, self.physics_))
         return self._shaped(physics) + self._learned(table, array)
 
@@ -281,8 +281,8 @@ class HybridRegressor(
             Zero if the learner is not used.
         """
         check_is_fitted(self)
-        array = validate_data(self, X, reset=False, dtype=np.float64)
-        return self._learned(_like(X, array), array)
+        array = validate_motion(self, X, reset=False, dtype=np.float64)
+        return self._learned(self._table(X, array), array)
 
     def _learned(self, table: Any, array: Array) -> Array:
         learned = np.zeros((len(array), len(self.learned_weight_)))
@@ -291,6 +291,10 @@ class HybridRegressor(
             learned += np.reshape(self.learner_.predict(own), learned.shape)
             learned *= self.learned_weight_ * fade(self._novelty(array))[:, None]
         return self._shaped(learned)
+
+    def _table(self, X: Any, array: Array) -> Any:
+        """The motion as given if X has column names, otherwise the checked array."""
+        return array if column_names(X) is None else motion_of(self, X)
 
     def _shaped(self, torque: Any) -> Array:
         shape = (-1,) if self._one_dimensional else (-1, len(self.learned_weight_))
@@ -315,12 +319,7 @@ class HybridRegressor(
             out from there and is zero at twice that distance.
         """
         check_is_fitted(self)
-        return self._novelty(validate_data(self, X, reset=False, dtype=np.float64)) > 1.0
-
-
-def _like(X: Any, array: Array) -> Any:
-    """X as given if it has column names, otherwise the checked array."""
-    return array if column_names(X) is None else X
+        return self._novelty(validate_motion(self, X, reset=False, dtype=np.float64)) > 1.0
 
 
 def _column(factor: Array, values: Array) -> Array:

@@ -17,7 +17,6 @@ from sklearn.utils.validation import (
     _check_sample_weight,
     check_is_fitted,
     has_fit_parameter,
-    validate_data,
 )
 
 from skidyn._columns import Columns, ColumnSpec, resolve_columns
@@ -25,6 +24,7 @@ from skidyn._compat import HasMethods, fit_context
 from skidyn._exceptions import ColumnError
 from skidyn._keys import fitted_keys
 from skidyn._order import taken, time_order
+from skidyn._validation import validate_motion
 from skidyn.effects import dahl_state
 from skidyn.model_selection import order_of_log
 
@@ -124,7 +124,7 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
         self : object
             The fitted regressor.
         """
-        X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
+        X, y = validate_motion(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
         self._one_dimensional = y.ndim == 1
         targets = y.reshape(len(y), -1)
         self._n_outputs = targets.shape[1]
@@ -202,7 +202,7 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
             Predicted torque.
         """
         check_is_fitted(self)
-        X = validate_data(self, X, reset=False, dtype=np.float64)
+        X = validate_motion(self, X, reset=False, dtype=np.float64)
         torque = np.stack(
             [
                 estimator.predict(own)

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils.metaestimators import available_if
-from sklearn.utils.validation import _check_sample_weight, validate_data
+from sklearn.utils.validation import _check_sample_weight
 
 from skidyn._checks import warn_about_log
 from skidyn._columns import ColumnSpec
 from skidyn._signals import Array, Signals
+from skidyn._validation import validate_motion
 from skidyn.effects import Term, TermSum, make_terms
 from skidyn.evidence import (
     Evidence,
@@ -305,7 +306,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         whole = problem.with_base_columns()
         others = None
         if instruments is not None:
-            Z = validate_data(self, instruments, reset=False, dtype=np.float64)
+            Z = validate_motion(self, instruments, reset=False, dtype=np.float64)
             Z = Z[order] if len(Z) == len(order) else Z
             others = instrument_rows(problem, fit, self._read(Z), self._smooths())
         self.rows_ = "averaged"

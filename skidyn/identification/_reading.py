@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted
 
 from skidyn._checks import warn_about_log
 from skidyn._columns import Columns, ColumnSpec, resolve_columns, trajectory_numbers
 from skidyn._exceptions import ColumnError
 from skidyn._order import has_one_motion, order_in_time
 from skidyn._signals import Array, Signals, rates_of, refuse_other_gravity, signals_from
+from skidyn._text import counted
+from skidyn._validation import validate_motion
 from skidyn.effects import Term
 from skidyn.evidence import broken_notes, smooth_motion
 from skidyn.identification._recordings import Recordings, named_recordings, recognise
@@ -37,7 +39,7 @@ class Reading:
     def _begin(self, X: Any, y: Any, first: bool) -> tuple[Signals, Array, NDArray[np.intp]]:
         """Motion and torque of validated data in the order of time, and that order."""
         table = X
-        X, y = validate_data(
+        X, y = validate_motion(
             self, X, y, reset=first, multi_output=True, y_numeric=True, dtype=np.float64
         )
         if first:
@@ -62,7 +64,7 @@ class Reading:
         notes = broken_notes(signals, torque, self.robot_.joint_names)
         self._broken = bool(notes)
         for what, where in notes:
-            warn_about_log(f"{what[0].upper()}{what[1:]} {where}.")
+            warn_about_log(f"{what}: {where}.")  # as the checks say it
         return signals, torque, order
 
     def _doubt_trajectories(self, numbers: NDArray[Any], column: int) -> None:
@@ -108,7 +110,7 @@ class Reading:
         """Motion in the order of time, and the positions of the rows of X in it."""
         check_is_fitted(self)
         refuse_other_gravity(X, self.robot_)
-        X = validate_data(self, X, reset=False, dtype=np.float64)
+        X = validate_motion(self, X, reset=False, dtype=np.float64)
         order = self._order(X)
         signals = self._read(X[order])
         if named_recordings(self.effect_terms_):
@@ -139,7 +141,7 @@ class Reading:
         n = self.robot_.n_joints
         if torque.shape[1] != n:
             raise ColumnError(
-                f"y has {torque.shape[1]} column(s); the robot has {n} joints "
+                f"y has {torque.shape[1]} column(s); the robot has {counted(n, 'joint')} "
                 f"({', '.join(self.robot_.joint_names)})"
             )
 

@@ -56,7 +56,8 @@ def _clock(table: pd.DataFrame, rate: float | None, source: str) -> tuple[np.nda
     """Clock of one table, and the stamp from which it counts; None if it begins at its own zero."""
     import pandas
 
-    if "time" not in table.columns:
+    empty = "time" in table.columns and bool(table["time"].isna().all()) and len(table) > 0
+    if "time" not in table.columns or (empty and rate is not None):
         if rate is None:
             raise LogError(
                 f"{source} has no time column. Name it with --columns time=NAME (in Python: "

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from skidyn._exceptions import LogWarning, SkidynError
+from skidyn._signals import Array
 from skidyn.logs._files import Channel
 from skidyn.logs._remedies import Remedies, turn_gravity
 from skidyn.logs._table import TableOptions, build_table
@@ -52,15 +53,14 @@ def by_influence(
     for told, remedy in zip(checks, remedies, strict=True):
         after = None
         if changed and told.check == "description_units":
-            share = float(np.max(1 - before / described).clip(0.0, 1.0))
-            told = replace(told, influence=share)
+            told = replace(told, influence=_removed(described, before))
         elif remedy is not None:
             try:
                 after = errors_of_fits(measured(*_mended(frame, robot, remedy)))
             except SkidynError:
                 pass  # a remedy that is possible only with another one has no influence of its own
         if after is not None:
-            told = replace(told, influence=float(np.max(1 - after / before).clip(0.0, 1.0)))
+            told = replace(told, influence=_removed(before, after))
         found.append(told)
 
     def place(told: Suspicion) -> tuple[int, float]:
@@ -68,6 +68,12 @@ def by_influence(
         return CERTAINTIES.index(told.certainty), 1.0 if known is None else -known
 
     return sorted(found, key=place)
+
+
+def _removed(before: Array, after: Array) -> float:
+    """Largest share of an error that is no longer there; none of an error of zero."""
+    left = np.divide(after, before, out=np.ones_like(before), where=before > 0)
+    return float(np.max(1 - left).clip(0.0, 1.0))
 
 
 def _mended(frame: pd.DataFrame, robot: Robot, remedy: Remedy) -> tuple[pd.DataFrame, Robot]:

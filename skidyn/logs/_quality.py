@@ -13,6 +13,7 @@ from skidyn._checks import as_numbers, check_time_order, count_joints, require_c
 from skidyn._exceptions import LogError
 from skidyn._plain import plain
 from skidyn._signals import Signals
+from skidyn._text import counted
 from skidyn.logs._influence import by_influence
 
 if TYPE_CHECKING:
@@ -264,10 +265,16 @@ def _measured(frame: pd.DataFrame, robot: Robot | None) -> tuple[Measurement, in
     """The measurement of a log, its number of trajectories, and sentences about omitted rows."""
     from skidyn.measurement import Measurement, count_same_stamps, regular_clock
 
+    if not hasattr(frame, "attrs"):  # of a DataFrame of pandas
+        given = repr(frame) if isinstance(frame, str) else type(frame).__name__
+        raise LogError(
+            f"check_log was given {given}; expected a DataFrame, as of read_log: "
+            "check_log(read_log('log.csv'))."
+        )
     n = count_joints(frame)
     if robot is not None and robot.n_joints != n:
         raise LogError(
-            f"the log has {n} joints, the robot has {robot.n_joints} "
+            f"the log has {counted(n, 'joint')}, the robot has {robot.n_joints} "
             f"({', '.join(robot.joint_names)}). If the log covers part of the robot, load it with "
             "Robot.from_urdf(..., joints=[...])."
         )
@@ -349,8 +356,9 @@ def _joints(measurement: Measurement) -> list[JointQuality]:
 
 
 _SINGLE = (
-    "there is a single trajectory: errors can only be evaluated on held-out parts of it "
-    "(split_gaps, split_dwells or several files give more trajectories)."
+    "there is a single trajectory: errors can only be evaluated on held-out parts of it (several "
+    "files give more, or a column 'trajectory'; in Python also read_log(..., split_dwells=1.0), "
+    "which cuts at rests longer than 1 s)."
 )
 _MOTION_HEAD = "  position range  coverage     step   speed reversals"
 _TORQUE_HEAD = "         torque range  at limit  at rest     dq/q'  delay ms"

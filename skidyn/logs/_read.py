@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -36,7 +36,7 @@ def read_log(
     robot: Robot | None = None,
     columns: ColumnMap | None = None,
     units: Mapping[str, str] | None = None,
-    drive_gains: Sequence[float] | None = None,
+    drive_gains: float | Sequence[float] | None = None,
     topics: Sequence[str] | None = None,
     rate: float | None = None,
     resample_rate: float | None = None,
@@ -83,7 +83,9 @@ def read_log(
         ["pos_a", "pos_b"]}``, ``{"tau": "effort_{joint}"}``, ``{"time": 0}``.
     units : mapping, optional
         Units that are not SI, per quantity or column: ``{"q": "deg", "time": "ms", "q3": "mm"}``.
-    drive_gains : sequence of float, N m/A or N/A, optional
+        With a robot, that of a quantity applies to the joints that can have it: ``deg`` to turning
+        joints, ``mm`` to sliders.
+    drive_gains : float or sequence of float, N m/A or N/A, optional
         Torque per ampere and joint, to read a log of currents (``i1 .. in``) as torques.
     topics : sequence of str, optional
         Topics of a bag or groups of an HDF5 file to read; all that hold joint states if None.
@@ -194,9 +196,7 @@ def read_log(
     """
     import pandas
 
-    paths = [path] if isinstance(path, (str, os.PathLike)) else list(path)
-    if not paths:
-        raise LogError("no file to read: the list of paths is empty.")
+    paths = _paths(path)
     _check_mapping("columns", columns, (str, int))
     _check_mapping("units", units, (str,))
     said: list[str] = []
@@ -269,6 +269,24 @@ def read_log(
         for message in (*quality.faults, *told):
             warn_about_log(message)
     return frame
+
+
+def _paths(path: Any) -> list[PathLike]:
+    """One path or several as a list."""
+    if isinstance(path, (str, os.PathLike)):
+        return [path]
+    if hasattr(path, "columns"):
+        raise LogError(
+            "read_log was given a table; expected the path of a log, or several. A table needs no "
+            "reading: pass it as it is, for example to check_log, or save it to a file and read "
+            "that if its columns have other names or units."
+        )
+    several = list(path) if isinstance(path, Iterable) else [path]
+    if not all(isinstance(item, (str, os.PathLike)) for item in several):
+        raise LogError(f"path={path!r}; expected the path of a log, or a list of paths.")
+    if not several:
+        raise LogError("no file to read: the list of paths is empty.")
+    return several
 
 
 def _check_mapping(name: str, value: Any, kinds: tuple[type, ...]) -> None:

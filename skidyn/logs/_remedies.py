@@ -13,6 +13,7 @@ import numpy as np
 from skidyn._exceptions import LogError
 from skidyn._repeated import is_repeated
 from skidyn._signals import find_segments
+from skidyn._text import counted
 from skidyn.logs._placeholders import Placeholder
 
 if TYPE_CHECKING:
@@ -211,8 +212,8 @@ def _reorder(
             )
         if sorted(numbers) != list(range(1, n + 1)):
             raise LogError(
-                f"order: {list(numbers)} is not an order of {n} joints; expected every number "
-                f"from 1 to {n} once: for each joint of the robot the column that holds it."
+                f"order: {list(numbers)} is not an order of {counted(n, 'joint')}; expected every "
+                f"number from 1 to {n} once: for each joint of the robot the column that holds it."
             )
         columns = [f"{quantity}{k}" for k in numbers]
         if not set(columns) <= set(table.columns):

@@ -20,7 +20,8 @@ from skidyn._checks import (
 )
 from skidyn._exceptions import LogError
 from skidyn._names import NameMatch, match_names
-from skidyn._units import convert_units, refuse_stated_units
+from skidyn._text import counted
+from skidyn._units import convert_units, refuse_stated_units, units_of_joints
 from skidyn.logs._clock import (
     align_channels,
     clocks,
@@ -50,7 +51,7 @@ class TableOptions:
     robot: Robot | None = None
     columns: ColumnMap | None = None
     units: Mapping[str, str] | None = None
-    drive_gains: Sequence[float] | None = None
+    drive_gains: float | Sequence[float] | None = None
     rate: float | None = None
     resample_rate: float | None = None
     missing: Literal["error", "drop"] = "error"
@@ -83,7 +84,7 @@ def build_table(
     )
     refuse_stated_units(match.units, options.units or {}, source)
     tables = [_renamed(channel, match) for channel in channels]
-    times = clocks(tables, options.rate, [f"{source} ({c.name})" for c in channels])
+    times = clocks(tables, options.rate, [_named(source, c) for c in channels])
     tables = [
         _in_si(table.assign(time=time), match, source, options, failed)
         for table, time in zip(tables, times, strict=True)
@@ -104,6 +105,12 @@ def build_table(
         table = failed.remove_rest(table)
         match.notes += failed.notes()
     return _in_order(_clean(table, n, match, source, options), n), match
+
+
+def _named(source: str, channel: Channel) -> str:
+    """A channel of a log for a message; the only one of a file has the name of the file."""
+    name = str(channel.name)
+    return source if name in source else f"{source} ({name})"
 
 
 def _listed_joints(channels: Sequence[Channel]) -> dict[str, Sequence[str]]:
@@ -148,6 +155,8 @@ def _in_si(
         for target, unit in (options.units or {}).items()
         if target in names or target in names.values()
     }
+    if options.robot is not None and options.remedies.order is None:
+        mine = units_of_joints(mine, kept, options.robot, match.notes)
     return convert_units(failed.remove(table[kept]), mine)
 
 
@@ -183,9 +192,12 @@ def _refuse_unused_units(
 
 
 def _torque_from_current(
-    table: pd.DataFrame, n: int, gains: Sequence[float] | None, source: str
+    table: pd.DataFrame, n: int, gains: float | Sequence[float] | None, source: str
 ) -> pd.DataFrame:
-    """Torque columns from currents and gains; currents alone are never used as torques."""
+    """Torque columns from currents and gains; currents alone are never used as torques.
+
+    The gains are one for each joint; that of a single joint may be a number.
+    """
     import pandas as pd
 
     currents = [f"i{k + 1}" for k in range(n)]
@@ -193,27 +205,40 @@ def _torque_from_current(
     if gains is None:
         if has_current and "tau1" not in table.columns:
             raise LogError(
-                f"{source} holds motor currents (i1..i{n}) and no torques. Pass drive_gains=[...] "
-                "(--drive-gains on the command line), "
+                f"{source} holds motor currents ({_first_to_last('i', n)}) and no torques. Pass "
+                "drive_gains=[...] (--drive-gains on the command line), "
                 "the torque per ampere of each joint at the joint (N m/A: torque constant times "
                 "gear ratio)."
             )
         return table
     if not has_current:
         raise LogError(
-            f"drive_gains is given, but {source} has no currents i1..i{n}. If its torque columns "
-            "are currents, say so with columns={'i': [...]} (--columns 'i=name{i}' on the "
-            "command line)."
+            f"drive_gains is given, but {source} has no currents {_first_to_last('i', n)}. If its "
+            "torque columns are currents, say so with columns={'i': [...]} (--columns 'i=name{i}' "
+            "on the command line)."
         )
     try:
-        factors = np.asarray(gains, dtype=float)
+        factors = np.atleast_1d(np.asarray(gains, dtype=float))
     except (TypeError, ValueError):
-        raise LogError(f"drive_gains is {gains!r}; expected {n} numbers, one per joint.") from None
+        factors = np.zeros(0)
     if factors.shape != (n,) or not np.isfinite(factors).all():
-        raise LogError(f"drive_gains needs {n} finite numbers, one per joint; got {factors}.")
+        form = ", ".join(["0.62", "0.5", "..."][:n]) if n > 1 else "0.62"
+        raise LogError(
+            f"drive_gains is {gains!r}; expected {counted(n, 'finite number')}, one for each "
+            f"joint: --drive-gains '[{form}]' (in Python: drive_gains=[{form}])."
+        )
     torques = {f"tau{k + 1}": factors[k] * table[name] for k, name in enumerate(currents)}
     others = table.drop(columns=[name for name in torques if name in table.columns])
     return pd.concat([others, pd.DataFrame(torques, index=table.index)], axis=1)
+
+
+def _first_to_last(quantity: str, n: int) -> str:
+    """Names of the columns of a quantity.
+
+    >>> _first_to_last("i", 1), _first_to_last("i", 6)
+    ('i1', 'i1..i6')
+    """
+    return f"{quantity}1" if n == 1 else f"{quantity}1..{quantity}{n}"
 
 
 def _clean(

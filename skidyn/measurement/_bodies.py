@@ -130,14 +130,15 @@ class Bodies(Check):
             return
         joints = [k for k, bad in zip(seen.joints, wrong | odd, strict=True) if bad]
         ratios = ", ".join(
-            f"{seen.stated.scale[k] / seen.identified.scale[k]:.2g} on {measurement.joint(k)}"
+            f"{seen.stated.scale[k] / seen.identified.scale[k]:.2g} times on {measurement.joint(k)}"
             for k in joints
         )
-        gains = ", ".join(f"{seen.stated.gain[k]:.2g}" for k in joints)
+        gains = ", ".join(f"{np.round(seen.stated.gain[k], 2) + 0.0:.2g}" for k in joints)
         yield self.suspicion(
             "masses or inertias of the description differ from those of the robot",
-            f"the error with the stated bodies is {ratios} times that with identified ones, "
-            f"although friction and the scale of each torque ({gains}) were fitted with them. A "
+            f"the error with the stated bodies is larger than with identified ones, {ratios}, "
+            "although friction and a factor of each torque were fitted to the stated ones as well "
+            f"({gains}). A "
             "model that keeps the stated bodies (--nominal) would show spurious effects; a model "
             "that identifies them is not affected",
             "noted" if measurement.identified is None else "suspected",

@@ -20,9 +20,9 @@ CLIPPED = 0.002
 #: Fourth differences of a torque relative to its spread above which it has noise; joints of
 #: recordings with noise are never below 4e-4.
 NOISELESS = 1e-5
-#: Step of a torque, as a share of its spread, that is suspected; how many times as often as the
-#: value next to it an extreme value of a coarse torque occurs if it is clipped.
-LARGE_STEP, OFTENER = 0.5, 3.0
+#: How many times as often as the value next to it an extreme value of a coarse torque occurs if it
+#: is clipped.
+OFTENER = 3.0
 #: How many times as large a step of a velocity must be as that of differences of the positions.
 COARSER = 2.0
 
@@ -35,6 +35,8 @@ class StillJoint(Check):
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
         q = measurement.signals.q
+        if measurement.shuffled:
+            return  # reversals cannot be told
         for k, moves in enumerate(measurement.excited):
             if not moves:
                 yield self.suspicion(
@@ -102,6 +104,28 @@ class CoarseVelocity(Check):
             )
 
 
+class UnrecordedTorque(Check):
+    """Torques of a moving robot none of which ever changes."""
+
+    name = "unrecorded_torque"
+    of_sensor = True
+    suspects = "torque that was not recorded: it is constant on all joints while the robot moves"
+
+    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        if not measurement.unrecorded:
+            return
+        values = ", ".join(f"{value:.4g}" for value in measurement.torque[0])
+        of = "that of the joint is" if measurement.n_joints == 1 else "those of the joints are"
+        yield self.suspicion(
+            "the torque was not recorded",
+            f"the robot moves, but no torque ever changes: {of} {values} in every row. Record the "
+            "torque or the current of the motors, or name the columns that hold it with --columns "
+            "(in Python: columns=); for position servos, their commands can take its place "
+            "(--controller fit)",
+            "certain",
+        )
+
+
 class ConstantTorque(Check):
     """A torque that never changes: in the log, in a trajectory, or at the ends of trajectories."""
 
@@ -132,7 +156,7 @@ class ConstantTorque(Check):
         lost = measurement.clipped
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
-            if k in lost:
+            if k in lost or measurement.unrecorded:
                 continue  # reported already
             if np.ptp(torque) == 0:
                 yield self.suspicion(
@@ -192,15 +216,22 @@ class CoarseTorque(Check):
     suspects = "torque in coarse steps"
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        for k, (step, share) in measurement.coarse_torques.items():
-            unit = "N" if measurement.signals.prismatic[k] else "N m"
-            yield self.suspicion(
-                f"the torque of {measurement.joint(k)} comes in coarse steps",
-                f"the steps of {step:.3g} {unit} are {share:.0%} of its standard deviation; "
-                "smaller effects cannot be found on this joint",
-                "suspected" if share > LARGE_STEP else "noted",
-                [k],
-            )
+        coarse = measurement.coarse_torques
+        if not coarse:
+            return
+        told = ", ".join(
+            f"{step:.3g} {'N' if measurement.signals.prismatic[k] else 'N m'} ({share:.0%})"
+            for k, (step, share) in coarse.items()
+        )
+        one = len(coarse) == 1
+        yield self.suspicion(
+            f"the torque of {measurement.joints(coarse)} comes in coarse steps",
+            f"the {'step' if one else 'steps'}, and the share of the standard deviation, "
+            f"{'is' if one else 'are'} {told}; smaller effects cannot be found on "
+            f"{'this joint' if one else 'these joints'}",
+            "noted",  # nothing can be done about a recording of it
+            coarse,
+        )
 
 
 class SmoothTorque(Check):

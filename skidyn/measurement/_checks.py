@@ -23,6 +23,7 @@ from skidyn.measurement._channels import (
     ConstantTorque,
     SmoothTorque,
     StillJoint,
+    UnrecordedTorque,
 )
 from skidyn.measurement._check import Check
 from skidyn.measurement._clock import (
@@ -73,6 +74,7 @@ UNSIGNED = UnsignedTorque()
 CHECKS: tuple[Check, ...] = (
     PaddedRows(),
     FailedReads(),
+    UnrecordedTorque(),
     DescriptionLengths(),
     DescriptionUnits(),
     LostRows(),
@@ -203,7 +205,7 @@ def check_measurement(measurement: Measurement) -> list[Suspicion]:
 
 #: Checks whose certain suspicions make every fit of the robot meaningless, and checks of which any
 #: suspicion does.
-_UNITS = (LostRows, ClockUnit, PositionUnit, Velocity, WrappedPosition)
+_UNITS = (UnrecordedTorque, LostRows, ClockUnit, PositionUnit, Velocity, WrappedPosition)
 _SCALES = (ClockUnit, PositionUnit, TaredTorque)
 
 
@@ -247,7 +249,7 @@ def refuse_certain(found: list[Suspicion]) -> None:
         raise MisreadLogError(
             "the log does not agree with its names and units, so that any effect found in it "
             "would be wrong. "
-            + " ".join(map(str, certain))
+            + " ".join(text[:1].upper() + text[1:] for text in map(str, certain))
             + " To continue anyway: --force (in Python: force=True).",
             certain,
         )

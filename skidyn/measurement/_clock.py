@@ -283,7 +283,8 @@ class ClockJitter(Check):
             says = (
                 ""
                 if gained is None
-                else f"; the fit of the torque improves by {gained:.0f} with them (log-likelihood)"
+                else "; with them the log-likelihood of the fit of the torque changes by "
+                f"{round(gained):+d}"
                 + ("" if harmful else ", so that the influence of the stamps is small")
             )
             sure = harmful and found.margin > CERTAIN and found.ratio > 1.2

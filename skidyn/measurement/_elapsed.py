@@ -211,7 +211,7 @@ class LostRows(Check):
         forwards = float(np.sum(found.steps[along] > WHOLE) / max(along.sum(), 1))
         anyhow = found.size > LARGE and found.disorder > FASTER
         if anyhow or (share > BACKWARDS and forwards > BACKWARDS):
-            measurement.lost = True
+            measurement.lost = measurement.shuffled = True
             if _alternate(measurement):
                 yield self.suspicion(
                     "every second row is of another source",

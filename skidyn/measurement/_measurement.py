@@ -75,7 +75,7 @@ class Measurement:
     same_stamps : int, optional
         Rows that had the time stamp of the previous row although joints moved; ``signals`` then
         have an even clock.
-    late_position, readable, stale, lost, odd, one_zero, dead, scaled, smoothed : optional
+    late_position, readable, stale, lost, shuffled, odd, one_zero, dead, scaled, smoothed : optional
         Results of checks that are used by other checks; set by them.
     computed, frictionless, mixed : optional
         Results of checks that are used by other checks; set by them.
@@ -109,6 +109,7 @@ class Measurement:
     readable: bool = field(default=True, repr=False)
     stale: bool = field(default=False, repr=False)
     lost: bool = field(default=False, repr=False)
+    shuffled: bool = field(default=False, repr=False)
     odd: bool = field(default=False, repr=False)
     one_zero: Division | None = field(default=None, repr=False)
     dead: bool = field(default=False, repr=False)
@@ -361,12 +362,17 @@ class Measurement:
         columns = self.torque.T
         return [longest_plateau_share(column, self.signals.segments) for column in columns]
 
+    @property
+    def unrecorded(self) -> bool:
+        """Whether no torque ever changes although the robot moves."""
+        return not np.ptp(self.torque, axis=0).any() and any(self.excited)
+
     @cached_property
     def fits(self) -> Fits | None:
-        """Averaged rows to which readings of the measurement are fitted."""
+        """Averaged rows to which readings are fitted; None without a robot, or without torque."""
         from skidyn.measurement._rows import make_fits  # with it all columns of the evidence
 
-        if self.robot is None:
+        if self.robot is None or self.unrecorded:
             return None
         stuck = [*self.stuck.values(), *self.constant.values()]
         odd = [*self.odd_motion, *(run for runs in stuck for run in runs)]

@@ -42,7 +42,7 @@ FINE = 50
 def channel_step(values: np.ndarray) -> float:
     """Step of a channel with few values, or of a coarse sensor; NaN if it is not coarse."""
     distinct = np.unique(values)
-    if 2 < len(distinct) <= FEW_VALUES:
+    if 2 < len(distinct) <= min(FEW_VALUES, len(values) // 2):  # which recur
         return float(np.median(np.diff(distinct)))
     return step_of_values(distinct)
 
@@ -68,10 +68,10 @@ def held_share(position: np.ndarray, within: np.ndarray, step: float) -> float:
     Returns
     -------
     float
-        0 for a position in coarse steps, which change one by one.
+        0 for a position in coarse steps, which change one by one, and with too few samples.
     """
     moved = np.abs(np.diff(position))
-    if not within.any() or np.ptp(position) == 0:
+    if len(position) <= STRIDE or not within.any() or np.ptp(position) == 0:
         return 0.0
     # motion over several steps, so that rests do not count
     way = np.abs(position[STRIDE:] - position[:-STRIDE])

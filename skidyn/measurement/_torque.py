@@ -356,8 +356,10 @@ def _one_of_two(told: Suspicion, changes: Iterable[Change]) -> Suspicion:
     return replace(
         told,
         suspicion=f"either {told.suspicion}, or there is another cause: {names}",
-        evidence=f"{told.evidence}; the other cause, on the same joints, explains it equally well",
+        evidence=f"{told.evidence}; the other cause, on the same joints, explains it equally well"
+        + ("" if told.remedy is None else f", so {told.remedy} may be wrong"),
         certainty="noted",
+        remedy=None,
     )
 
 

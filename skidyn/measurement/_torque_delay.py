@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from skidyn._text import counted
 from skidyn.measurement._check import Check
 from skidyn.measurement._delay import Delay, RunDelay, find_delay
 from skidyn.measurement._drift import Drift, find_drift
@@ -158,13 +159,13 @@ class TorqueDelay(Check):
                 if lag < 0:
                     yield self._late_command(-lag, found.error, n_alike)
                 return
-            late = float(f"{lag + early:.5f}")
+            late, n = float(f"{lag + early:.5f}"), measurement.n_joints
+            equally = f", equal in {n_alike} of {n} joints" if n > 1 else ""
             yield self.suspicion(
                 f"torque is {'late' if ms > 0 else 'early'} relative to the motion by about "
                 f"{abs(ms):.1f} ms",
                 "bodies, friction and rotor inertia explain it best at that lag (standard error "
-                f"{1e3 * found.error:.1f} ms, equal in {n_alike} of "
-                f"{measurement.n_joints} joints)",
+                f"{1e3 * found.error:.1f} ms{equally})",
                 "suspected",
                 remedy=remedy_of("late", {"tau": late}),
             )
@@ -288,7 +289,7 @@ class TorqueDelay(Check):
             "commands reach the servos later than the controller states, by about "
             f"{1e3 * lag:.0f} ms of delay or more",
             "bodies, friction and rotor inertia explain the servos' torque best at that lag "
-            f"(standard error {1e3 * error:.1f} ms, equal in {n_alike} joints)",
+            f"(standard error {1e3 * error:.1f} ms, equal in {counted(n_alike, 'joint')})",
             "suspected",
             remedy=("--controller fit, or its delay", "Controller(delay=...), fit_servo"),
         )

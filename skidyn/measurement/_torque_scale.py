@@ -25,7 +25,7 @@ from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._rate import STATIC, asked_rate, rate_gain
 from skidyn.measurement._reading import Reading
 from skidyn.measurement._size import find_size
-from skidyn.measurement._suspicion import Suspicion, remedy_of
+from skidyn.measurement._suspicion import Remedy, Suspicion, remedy_of
 from skidyn.measurement._torque import asked_changes, readable_fits
 
 #: Least log-likelihood gain of another scale, and its value if the stated bodies do not confirm it.
@@ -166,11 +166,11 @@ class TorqueScale(Check):
                 yield self.suspicion(
                     f"either the torque of {measurement.joint(k)} has a different scale than that "
                     "of the other joints, or the bodies it moves differ from the description",
-                    f"it is {gain:.3g} times that of the stated bodies; the other joints do not "
-                    "determine which",
+                    f"it is {gain:.3g} times that of the stated bodies, which the other joints do "
+                    "not decide; correct the description, or, if it is the scale, the torque by "
+                    + _gain_option(k, 1 / (_unit_like(gain) or gain)),
                     "noted",
                     [k],
-                    _gain_remedy({k: float(f"{1 / (_unit_like(gain) or gain):.3g}")}),
                 )
         if found:  # gravity that was removed from one torque makes it small, too
             found = {k: found[k] for k in set(found) - set(without_gravity(measurement, fits))}
@@ -189,11 +189,11 @@ class TorqueScale(Check):
                 yield self.suspicion(
                     f"either the torque of {measurement.joint(k)} is in another unit, or its "
                     "effort limit in the description is wrong",
-                    f"it reaches {multiple:.3g} times that limit; the bodies that it moves do not "
-                    "determine its scale",
+                    f"it reaches {multiple:.3g} times that limit, and the bodies that it moves do "
+                    "not determine its scale; correct the limit, or, if it is the unit, the torque "
+                    f"by {_gain_option(k, 1 / KILO)}",
                     "noted",
                     [k],
-                    _gain_remedy({k: 1 / KILO}),
                 )
         if beyond:
             names = measurement.joints(beyond)
@@ -252,6 +252,11 @@ def _one_sided(gains: Array) -> bool:
 def _gain_remedy(factors: dict[int, float]) -> tuple[str, str]:
     """Factors of torques as an option."""
     return remedy_of("gain", {f"tau{k + 1}": value for k, value in factors.items()})
+
+
+def _gain_option(joint: int, factor: float) -> str:
+    """The factor of one torque for a sentence that leaves the choice to the user."""
+    return str(Remedy(*_gain_remedy({joint: float(f"{factor:.3g}")})))
 
 
 def _unit_like(gain: float) -> float | None:

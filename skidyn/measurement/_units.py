@@ -138,6 +138,8 @@ class PositionUnit(Check):
     misnames = True
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
+        if measurement.shuffled:
+            return  # turns and rates of positions follow from the order of the rows
         yield from self._sliding(measurement)
         slopes = [s for s, r in measurement.velocities if np.isfinite(s) and r > ALIKE]
         typical = float(np.median(slopes)) if slopes else 1.0
@@ -230,7 +232,10 @@ class PositionUnit(Check):
             return  # found by their velocities, joint by joint
         k = int(np.argmax(np.where(outside, largest / limits, 0)))
         where = f"the limit is {limits[k]:.3g} rad" if known[k] else "one turn is 6.28 rad"
-        seen = f"q{k + 1} ({measurement.joint_names[k]}) reaches {largest[k]:.4g} rad where {where}"
+        farthest = float(largest[k])
+        if farthest < FAR * limits[k]:  # it was wrapped
+            farthest = float(np.abs(_unwrapped(measurement)[:, k]).max())
+        seen = f"q{k + 1} ({measurement.joint_names[k]}) reaches {farthest:.4g} rad where {where}"
         degrees = bool(np.all(largest[turning] * DEGREE <= 1.1 * limits[turning]))
         usual = float(np.quantile(largest[turning], 0.5, method="lower"))  # of two the smaller
         if usual < LEAST_DEGREES and degrees:
@@ -269,7 +274,7 @@ class PositionUnit(Check):
             certain = (bool((outside & known).any()) and whole) or usual > 25
             yield self.suspicion(
                 "positions look like degrees",
-                f"{seen}; read as degrees it would be {largest[k] * DEGREE:.3g} rad",
+                f"{seen}; read as degrees it would be {farthest * DEGREE:.3g} rad",
                 "certain" if certain else "suspected",
                 np.flatnonzero(outside),
                 remedy_of("units", both),
@@ -298,10 +303,13 @@ def _limits(measurement: Measurement) -> tuple[NDArray[np.bool_], Array, NDArray
 def _too_far(measurement: Measurement, times: float) -> NDArray[np.bool_]:
     """Turning joints whose positions go so many times their limits, or turns, away."""
     turning, limits, _ = _limits(measurement)
-    q = measurement.unwrapped  # a position that was wrapped goes no farther
-    # Whole turns too many are no other unit.
-    q = q - 2 * np.pi * np.round(np.median(q, axis=0) / (2 * np.pi))
-    return np.asarray(turning & (np.abs(q).max(axis=0) > times * limits))
+    return np.asarray(turning & (np.abs(_unwrapped(measurement)).max(axis=0) > times * limits))
+
+
+def _unwrapped(measurement: Measurement) -> Array:
+    """Positions without jumps by a turn, and without whole turns, which are no other unit."""
+    q = measurement.unwrapped
+    return np.asarray(q - 2 * np.pi * np.round(np.median(q, axis=0) / (2 * np.pi)))
 
 
 def _odd_runs(measurement: Measurement) -> dict[int, float]:

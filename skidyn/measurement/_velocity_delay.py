@@ -69,7 +69,7 @@ class VelocityDelay(Check):
         joints: list[int] = [] if moving else list(own)
         if moving:
             number, of, its, alone = "", "", "the", ""
-            equally = f", equally in {len(own)} of {moving} moving joints"
+            equally = f", equally in {len(own)} of {moving} moving joints" if moving > 1 else ""
             in_time = "bodies, friction and rotor inertia explain the torque best at the time of"
         else:
             number, of, its = f"{joints[0] + 1}", f" of {measurement.joints(joints)}", "its"

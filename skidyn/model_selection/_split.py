@@ -97,6 +97,12 @@ class TrajectoryKFold(BaseCrossValidator):
         if groups is None:
             groups = column_of(X, self.trajectory, "trajectory")
         n_trajectories = len(np.unique(groups))
+        if n_trajectories == 1:
+            raise ValueError(
+                "X has a single trajectory, which cannot be held out. Number the recordings in the "
+                "column of trajectories, record more, or use PhaseKFold for one periodic recording "
+                "or TimeSeriesSplit of scikit-learn for another one."
+            )
         if n_trajectories < self.n_splits:
             raise ValueError(
                 f"n_splits={self.n_splits} folds need as many trajectories; X has "

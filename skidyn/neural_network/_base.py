@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.parallel import Parallel, delayed
-from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
+from sklearn.utils.validation import _check_sample_weight, check_is_fitted
 from torch import nn
 
 from skidyn._columns import ColumnSpec
@@ -23,6 +23,7 @@ from skidyn._compat import CallbackSupportMixin, Interval, StrOptions, fit_conte
 from skidyn._keys import Keys, fitted_keys
 from skidyn._order import taken, time_order
 from skidyn._signals import Array
+from skidyn._validation import validate_motion
 from skidyn.model_selection import order_of_log
 from skidyn.neural_network._engine import (
     Network,
@@ -167,7 +168,7 @@ class SequenceRegressor(
         self : object
             The fitted regressor.
         """
-        X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
+        X, y = validate_motion(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
         keys = self._keys()
         rng = check_random_state(self.random_state)
         weight = _check_sample_weight(sample_weight, X, dtype=np.float64, copy=True)
@@ -271,7 +272,7 @@ class SequenceRegressor(
             Predicted torque.
         """
         check_is_fitted(self)
-        X = validate_data(self, X, reset=False, dtype=np.float64)
+        X = validate_motion(self, X, reset=False, dtype=np.float64)
         order = time_order(X, self._keys())
         if order is None:
             return self._predict_array(X)

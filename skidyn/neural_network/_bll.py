@@ -24,7 +24,6 @@ from sklearn.utils.validation import (
     _check_sample_weight,
     check_is_fitted,
     has_fit_parameter,
-    validate_data,
 )
 from skorch import NeuralNet
 
@@ -33,6 +32,7 @@ from skidyn._compat import HasMethods, Interval, StrOptions, fit_context
 from skidyn._keys import Keys, fitted_keys
 from skidyn._order import folds_taken, taken, time_order
 from skidyn._signals import Array
+from skidyn._validation import validate_motion
 from skidyn.model_selection import held_out_folds, order_of_log
 from skidyn.neural_network._base import SequenceRegressor, deferred_training, train_together
 from skidyn.neural_network._lstm import LSTMRegressor, directions
@@ -237,7 +237,7 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
             The fitted regressor.
         """
         table = X
-        X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
+        X, y = validate_motion(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
         if sample_weight is not None:
             sample_weight = _check_sample_weight(sample_weight, X, dtype=np.float64)
         keys = fitted_keys(self)
@@ -361,7 +361,7 @@ class BLLRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseEst
             Standard deviation over the members; only with ``return_std=True``.
         """
         check_is_fitted(self)
-        X = validate_data(self, X, reset=False, dtype=np.float64)
+        X = validate_motion(self, X, reset=False, dtype=np.float64)
         keys = fitted_keys(self)
         order = time_order(X, keys)
         X = keys.for_learner(X if order is None else X[order], self.bagging_.estimator_)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sklearn.base import clone
 from sklearn.model_selection import check_cv
 from sklearn.utils import _safe_indexing
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted
 from skorch.callbacks import Checkpoint, TrainEndCheckpoint
 from torch import nn
 
@@ -24,6 +24,8 @@ from skidyn._compat import HasMethods, Interval, StrOptions
 from skidyn._keys import Keys
 from skidyn._order import folds_taken, taken, time_order
 from skidyn._signals import Array
+from skidyn._text import counted
+from skidyn._validation import motion_of, validate_motion
 from skidyn.hybrid import TrainingRange, distances, fade, learned_weights
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import held_out_folds
@@ -219,8 +221,8 @@ class SDLRegressor(SequenceRegressor):
 
     def _held_out_weight(self, X: Any, y: Any, sample_weight: Any, groups: Any) -> Array:
         """Weight of the learned torque, from copies of the model that have not seen a fold."""
-        array = validate_data(self, X, reset=False, dtype=np.float64)
-        table = array if column_names(X) is None else X
+        array = validate_motion(self, X, reset=False, dtype=np.float64)
+        table = array if column_names(X) is None else motion_of(self, X)
         target = np.asarray(y, dtype=np.float64)
         counts = np.ones(len(array)) if sample_weight is None else np.asarray(sample_weight)
         folds: Any = None
@@ -282,7 +284,7 @@ class SDLRegressor(SequenceRegressor):
         n_targets, n_joints = y[:1].size, self._robot.n_joints
         if n_targets != n_joints:
             raise ValueError(
-                f"y has {n_targets} columns; the robot has {n_joints} joints: "
+                f"y has {n_targets} columns; the robot has {counted(n_joints, 'joint')}: "
                 f"{', '.join(self._robot.joint_names)}."
             )
 
@@ -396,7 +398,7 @@ class SDLRegressor(SequenceRegressor):
             Prediction far from the training samples.
         """
         check_is_fitted(self)
-        X = validate_data(self, X, reset=False, dtype=np.float64)
+        X = validate_motion(self, X, reset=False, dtype=np.float64)
         torque = self._weighted(X, self._rigid_body(X)[1])
         return torque[:, 0] if self._one_dimensional else torque
 
@@ -415,7 +417,7 @@ class SDLRegressor(SequenceRegressor):
             distance the prediction is the rigid-body torque alone.
         """
         check_is_fitted(self)
-        X = validate_data(self, X, reset=False, dtype=np.float64)
+        X = validate_motion(self, X, reset=False, dtype=np.float64)
         return self._novelty(self._inputs(X, self._keys())) > 1.0
 
     def _novelty(self, features: Array) -> Array:

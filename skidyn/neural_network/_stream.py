@@ -6,9 +6,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sklearn.utils.validation import validate_data
 
 from skidyn._signals import Array
+from skidyn._validation import validate_motion
 
 if TYPE_CHECKING:
     from skidyn.neural_network._base import SequenceRegressor
@@ -52,7 +52,7 @@ class TorqueStream:
             Their torque, equal to that of ``predict`` for the whole log.
         """
         estimator = self._estimator
-        new = validate_data(estimator, X, reset=False, dtype=np.float64)
+        new = validate_motion(estimator, X, reset=False, dtype=np.float64)
         log = np.concatenate([self._past, new])
         torque = estimator._predict_array(log)[len(self._past) :]
         last = estimator._keys().segments(log)[-1]

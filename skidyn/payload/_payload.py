@@ -31,7 +31,8 @@ from skidyn.robots import Robot
 
 CONFOUNDED = (
     "Mass and drive gains scale alike: gains that are 1 % too large make every parameter 1 % too "
-    "large. Only a known load separates them (estimate_drive_gains)."
+    "large. Only a known load separates them: skidyn payload --known-mass (in Python: "
+    "estimate_drive_gains)."
 )
 #: Number of times that the noise of the joints is estimated and the fit repeated.
 PASSES = 3

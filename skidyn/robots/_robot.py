@@ -21,7 +21,13 @@ from skidyn.robots._dynamics import PARAMETER_SYMBOLS, RigidBodyDynamics
 from skidyn.robots._mjcf import parse_mjcf
 from skidyn.robots._sdf import parse_sdf
 from skidyn.robots._urdf import parse_urdf
-from skidyn.robots._xml import first_element, name_of, parse_robot_element, read_description
+from skidyn.robots._xml import (
+    first_element,
+    name_of,
+    naming_file,
+    parse_robot_element,
+    read_description,
+)
 
 #: Permitted difference between frames of a chain and its description, m, because of float32.
 _SINGLE_PRECISION = 1e-5
@@ -150,8 +156,9 @@ class Robot(RigidBodyDynamics):
         >>> robot.gravity_torque([[0.5]])
         array([[19.62]])
         """
-        description, own = _read(source)
-        return cls._from_description(description, joints, own if gravity is None else gravity)
+        with naming_file(source):
+            description, own = _read(source)
+            return cls._from_description(description, joints, own if gravity is None else gravity)
 
     @classmethod
     def from_urdf(
@@ -203,8 +210,9 @@ class Robot(RigidBodyDynamics):
         >>> robot.gravity_torque([[1.5707963267948966]]).round(2)
         array([[9.81]])
         """
-        element = parse_robot_element(read_description(source), name_of(source))
-        return cls._from_description(parse_urdf(element), joints, gravity)
+        with naming_file(source):
+            element = parse_robot_element(read_description(source), name_of(source))
+            return cls._from_description(parse_urdf(element), joints, gravity)
 
     @classmethod
     def from_sdf(
@@ -258,7 +266,9 @@ class Robot(RigidBodyDynamics):
         >>> robot.gravity_torque([[1.5707963267948966]]).round(2)
         array([[9.81]])
         """
-        return cls._from_description(parse_sdf(read_description(source), model), joints, gravity)
+        with naming_file(source):
+            description = parse_sdf(read_description(source), model)
+            return cls._from_description(description, joints, gravity)
 
     @classmethod
     def from_mjcf(
@@ -306,8 +316,9 @@ class Robot(RigidBodyDynamics):
         >>> robot.gravity_torque([[1.5707963267948966]]).round(2)
         array([[9.81]])
         """
-        description, own = parse_mjcf(source)
-        return cls._from_description(description, joints, own if gravity is None else gravity)
+        with naming_file(source):
+            description, own = parse_mjcf(source)
+            return cls._from_description(description, joints, own if gravity is None else gravity)
 
     @classmethod
     def from_chain(

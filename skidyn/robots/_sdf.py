@@ -194,7 +194,7 @@ class _Reader:
         if kind not in ("revolute", "continuous", "prismatic"):
             raise RobotDescriptionError(
                 f"The {what} is of type {kind!r}; supported are revolute, continuous, prismatic "
-                "and fixed."
+                'and fixed. Set type="fixed" if its child does not move in the recordings.'
             )
         axis = required(element, "axis", what)
         limit, dynamics = only(axis, "limit", what), only(axis, "dynamics", what)

@@ -74,7 +74,9 @@ def _joint(element: ElementTree.Element) -> Joint:
     kind = word(element, "type", what)
     if kind not in (*MOVING_TYPES, "fixed"):
         raise RobotDescriptionError(
-            f"The {what} is of type {kind!r}; supported are {', '.join(MOVING_TYPES)} and fixed."
+            f"The {what} is of type {kind!r}; supported are {', '.join(MOVING_TYPES)} and fixed. "
+            'Set type="fixed" if its child does not move in the recordings; a base that floats or '
+            "drives has no model here, so that recordings with its base at rest are needed."
         )
     rotation, translation = _pose(element, what)
     fixed = kind == "fixed"

@@ -7,6 +7,8 @@ import os
 import re
 import shlex
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from xml.parsers import expat
 
@@ -53,6 +55,20 @@ def is_text(source: str | bytes | os.PathLike[str]) -> bool:
 def name_of(source: str | bytes | os.PathLike[str]) -> str:
     """Path of a description; a default one if the source is the text itself."""
     return "robot.urdf.xacro" if is_text(source) else os.fsdecode(source)
+
+
+@contextmanager
+def naming_file(source: str | bytes | os.PathLike[str]) -> Iterator[None]:
+    """Begin errors of a description that was read from a file with its path."""
+    try:
+        yield
+    except RobotDescriptionError as error:
+        if not isinstance(source, str | os.PathLike) or is_text(source):
+            raise
+        path = os.fsdecode(source)
+        if path in str(error):
+            raise
+        raise RobotDescriptionError(f"{path}: {error}") from error.__cause__
 
 
 def first_element(data: bytes) -> str:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skidyn._columns import command_columns, names_of_table, resolve_columns, trajectory_numbers
 from skidyn._exceptions import LogWarning, SkidynError
 from skidyn._signals import Array, Signals, rates_of, signals_from
-from skidyn._text import listed
+from skidyn._text import counted, listed
 from skidyn.evidence import smooth_motion
 from skidyn.forward import Controller
 from skidyn.robots import Robot
@@ -128,7 +128,9 @@ def fit_servo(robot: Robot, log: Any, *, shared: bool = False) -> Controller:
     signals, reference = _read(log, robot)
     n = robot.n_joints
     if reference.shape[1] != n:
-        raise SkidynError(f"the log has {reference.shape[1]} commands; the robot has {n} joints")
+        raise SkidynError(
+            f"the log has {reference.shape[1]} commands; the robot has {counted(n, 'joint')}"
+        )
     torque = robot.inverse_dynamics(signals.q, signals.dq, signals.ddq)
     designs = [
         np.column_stack([torque[:, j], signals.dq[:, j], signals.sign[:, j], 1 + 0 * torque[:, j]])

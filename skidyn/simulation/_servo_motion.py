@@ -22,9 +22,10 @@ from scipy.ndimage import maximum_filter1d
 
 from skidyn._columns import names_of_table, resolve_columns
 from skidyn._exceptions import LogError, SkidynError
+from skidyn._joint_numbers import joint_numbers
 from skidyn._progress import track
 from skidyn._signals import Array
-from skidyn._text import inside, measure
+from skidyn._text import inside, joints_of, measure
 from skidyn.effects import get_effect
 from skidyn.forward import Controller, JointLoop, Task, read_task
 from skidyn.simulation._servo_fit import Fit, covariance, fit_all
@@ -185,7 +186,7 @@ def explain_servo_motion(
     X: Any,
     controller: Controller,
     *,
-    joints: Sequence[int] | None = None,
+    joints: int | Sequence[int] | None = None,
     known: Sequence[tuple[str, int]] = (),
 ) -> list[ServoFinding]:
     """Find effects that are missing in the simulated motion of position servos.
@@ -210,7 +211,7 @@ def explain_servo_motion(
         and ``trajectory`` if there are several recordings; at least four pieces of 3 s.
     controller : Controller
         Gains, delay and limit of the servos.
-    joints : sequence of int, optional
+    joints : int or sequence of int, optional
         Joints, counted from 1, to be analysed; all by default.
     known : sequence of (str, int)
         Kinds and joints of effects that are part of the simulation from the start; unsupported ones
@@ -239,10 +240,10 @@ def explain_servo_motion(
     >>> print(found[0].sentence)  # doctest: +SKIP
     """
     n = model.robot_.n_joints
-    wanted = range(1, n + 1) if joints is None else joints
+    wanted = list(range(1, n + 1)) if joints is None else joint_numbers(joints)
     strange = [j for j in wanted if not 1 <= j <= n]
     if strange:
-        raise SkidynError(f"joints={list(wanted)}; the robot has joints 1 to {n}")
+        raise SkidynError(f"joints={wanted}; the robot has {joints_of(n)}")
     task = read_task(model, X, None, controller, PIECE)
     pieces = len(task.windows.rows)
     if pieces < FEWEST_PIECES:

@@ -57,6 +57,24 @@ def test_a_file_that_is_no_report_is_refused(tmp_path, capsys, text):
     assert not (tmp_path / "x.html").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["add", "--from", "nope.json", "--effect", "dahl"], "no file nope.json; --from must name"),
+        (["check", "a.csv", "--units", "deg"], "not NAME=VALUE, for example --units q=deg,time=ms"),
+        (
+            ["check", "a.csv", "--drive-gains", "0.6,0.5"],
+            "expected for example --drive-gains '[0.6",
+        ),
+    ],
+)
+def test_a_value_that_cannot_be_read_is_answered_by_an_example(tmp_path, capsys, words, said):
+    (tmp_path / "a.csv").write_text("time,q1\n0,0\n", encoding="utf-8")
+    words = [str(tmp_path / word) if word == "a.csv" else word for word in words]
+    assert cli.main(words) == cli.BAD_INPUT
+    assert said in capsys.readouterr().err
+
+
 def test_the_model_must_have_a_rigid_body(capsys, arguments):
     assert cli.main(["compare", *arguments, "--model", "viscous"]) == cli.BAD_INPUT
     assert "must contain rigid_body" in capsys.readouterr().err

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Torques that follow a signal with another size, or sign, in each recording."""
 
+import warnings
+
 import numpy as np
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
+from skidyn.diagnosis._changing_sizes import changing_size
 from skidyn.identification import RBDRegressor
 
 
@@ -35,3 +38,18 @@ def test_a_torque_of_one_size_is_the_same_in_all_recordings():
 
     assert all("trajectory" not in f.variables for f in diagnosis.findings)
     assert any(1 in f.joints for f in diagnosis.findings)
+
+
+def test_a_signal_that_hardly_varies_has_no_size():
+    rng = np.random.default_rng(0)
+    recording, quarter = np.repeat(np.arange(4), 80), np.tile(np.repeat(np.arange(4), 20), 4)
+    y = rng.normal(size=320)
+    rest = 1.0 + 1e-16 * rng.integers(0, 2, size=320)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert changing_size({"q1": rest, "q2": rest[::-1]}, y, recording, quarter) is None
+
+        swing = rng.normal(size=320)
+        y += np.where(recording % 2, 2.0, -2.0) * swing
+        factors, _ = changing_size({"q1": rest, "q2": swing}, y, recording, quarter)
+    assert [factor.signal for factor in factors] == ["q2"]

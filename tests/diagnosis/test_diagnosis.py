@@ -275,6 +275,23 @@ def test_a_robot_that_rests_is_refused_by_a_sentence():
         diagnose(RBDRegressor(log.robot), X, y)
 
 
+@pytest.mark.parametrize("model", [None, pd.DataFrame({"q1": [0.0]})])
+def test_a_model_that_is_none_is_refused_with_the_order_of_arguments(model):
+    with pytest.raises(ValueError, match=r"expected a regressor: diagnose\(model, X, tau\)"):
+        diagnose(model, RBDRegressor(load_planar_arm()), [[0.0]])
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_what_is_wrong_with_a_log_survives_a_failure_of_its_checks(n_jobs, monkeypatch):
+    def fails(measurement):
+        raise IndexError("out of bounds")
+
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=1, duration=1.0)
+    monkeypatch.setattr("skidyn.diagnosis._diagnosis.check_measurement", fails)
+    with pytest.raises(LogError, match="no joint moves long enough"):
+        diagnose(RBDRegressor(log.robot), log.X.iloc[:10], log.y[:10], n_jobs=n_jobs)
+
+
 @pytest.mark.parametrize(
     ("load", "kind"),
     [

@@ -17,13 +17,15 @@ def test_causes_make_up_the_squared_error(missing):
 
 
 def test_the_better_model_and_one_by_hand_are_the_same(missing, spring_log):
-    by_hand = missing.add("spring", joints=[2])
+    by_hand = missing.add("spring", joints=2)
     np.testing.assert_allclose(
         by_hand.predict(spring_log.X), missing.model.predict(spring_log.X), atol=1e-9
     )
 
 
 def test_what_cannot_be_added_is_refused(missing):
+    with pytest.raises(ValueError, match=r"joints='second'; expected the number"):
+        missing.add("spring", joints="second")
     with pytest.raises(EffectError, match="no joint 7"):
         missing.add("spring", joints=[7])
     with pytest.raises(EffectError, match="no formula was proposed"):

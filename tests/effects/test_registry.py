@@ -4,7 +4,14 @@
 import numpy as np
 import pytest
 
-from skidyn.effects import Coefficient, Effect, register_effect, unregister_effect
+from skidyn.effects import (
+    Coefficient,
+    Effect,
+    get_effect,
+    register_effect,
+    unregister_effect,
+)
+from skidyn.exceptions import EffectError
 
 
 @pytest.mark.slow
@@ -34,3 +41,9 @@ def test_diagnosis_finds_a_users_effect(robot):
         assert found[0].terms[0].joints == (2,)
     finally:
         unregister_effect("magnet")
+
+
+def test_the_closest_names_are_suggested_for_an_unknown_one():
+    with pytest.raises(EffectError, match="did you mean 'dahl'.*skidyn effects lists") as caught:
+        get_effect("dhal")
+    assert len(str(caught.value)) < 150

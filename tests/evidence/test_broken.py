@@ -12,6 +12,7 @@ from skidyn.effects import Signals
 from skidyn.evidence import broken_notes
 from skidyn.exceptions import LogWarning
 from skidyn.identification import RBDRegressor
+from skidyn.logs import check_log
 
 
 def swing(n=2000, rate=200.0):
@@ -75,8 +76,11 @@ def test_the_fit_is_that_without_the_broken_samples_and_says_so():
     torque[::977] += 500.0
     clean = RBDRegressor(log.robot).fit(log.X, log.y)
 
-    with pytest.warns(LogWarning, match="has outliers"):
+    with pytest.warns(LogWarning, match="has outliers") as caught:
         model = RBDRegressor(log.robot).fit(log.X, torque)
+    frame = log.frame.assign(tau1=torque[:, 0], tau2=torque[:, 1])
+    told = {str(check) for check in check_log(frame, log.robot).checks}
+    assert {str(warning.message) for warning in caught} <= told  # in the same words
 
     assert np.allclose(model.coef_, clean.coef_, rtol=0.02, atol=0.02 * np.abs(clean.coef_).max())
 

@@ -152,3 +152,16 @@ def test_the_numbers_of_a_log_are_known_before_its_checks():
     assert not first.checks and quality.checks
     parts = first.motion_table, quality.torque_table, quality.problems
     assert str(quality) == "\n\n".join(parts)
+
+
+@pytest.mark.parametrize("n_rows", [2, 3, 10])
+def test_few_rows_are_enough_for_a_report(n_rows):
+    quality = check_log(PLAIN.iloc[:n_rows], PLANAR)
+    assert quality.n_samples == n_rows
+    assert not any(joint.excited for joint in quality.joints)
+
+
+@pytest.mark.parametrize("given", ["log.csv", PLAIN.to_numpy()])
+def test_only_a_table_is_checked(given):
+    with pytest.raises(ValueError, match=r"expected a DataFrame.*check_log\(read_log"):
+        check_log(given)

@@ -357,6 +357,12 @@ def test_absent_unknown_and_empty_files(tmp_path):
         read_log([])
 
 
+@pytest.mark.parametrize("given", [pd.DataFrame({"time": [0.0]}), 5, [5]])
+def test_only_paths_are_read(given):
+    with pytest.raises(LogError, match="expected the path"):
+        read_log(given)
+
+
 def test_rows_in_reverse_order(saved):
     one = LOG[LOG["trajectory"] == 1].drop(columns="trajectory")
     with pytest.raises(LogError, match=r"reverse order. Sort them by time"):

@@ -70,10 +70,31 @@ def test_currents_are_never_taken_for_torques(saved):
         read_log(saved(currents))
     frame = quiet_read(saved(currents), drive_gains=[10.0, 4.0])
     np.testing.assert_allclose(frame["tau2"], 4.0 * LOG["tau2"])
-    with pytest.raises(LogError, match="drive_gains needs 2 finite numbers"):
+    with pytest.raises(LogError, match=r"expected 2 finite numbers.*\[0.62, 0.5\]"):
         read_log(saved(currents), drive_gains=[10.0])
     with pytest.raises(LogError, match="has no currents"):
         read_log(saved(LOG), drive_gains=[10.0, 4.0])
+
+
+def test_the_gain_of_one_joint_may_be_a_number(saved):
+    one = LOG[["time", "q1", "dq1"]].assign(i1=LOG["tau1"])
+    np.testing.assert_allclose(quiet_read(saved(one), drive_gains=0.62)["tau1"], 0.62 * LOG["tau1"])
+    with pytest.raises(LogError, match=r"currents \(i1\) and no torques"):
+        read_log(saved(one))
+
+
+def test_a_file_is_named_once(saved):
+    path = saved(LOG.drop(columns="time"))
+    with pytest.raises(LogError, match=r"log.csv has no time column"):
+        read_log(path)
+
+
+def test_a_clock_without_values_is_replaced_by_a_rate(saved):
+    path = saved(LOG.assign(time=np.nan))
+    for missing in ("error", "drop"):
+        with pytest.raises(LogError, match="No row has a time: state the sampling rate"):
+            read_log(path, missing=missing)
+    assert quiet_read(path, rate=50.0)["time"].iloc[1] == 0.02
 
 
 def test_trajectory_numbers_must_be_whole(saved):

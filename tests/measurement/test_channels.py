@@ -4,6 +4,9 @@
 import numpy as np
 import pytest
 
+from skidyn.diagnosis import diagnose
+from skidyn.exceptions import LogError
+from skidyn.identification import RBDRegressor
 from skidyn.logs import check_log, read_log
 
 
@@ -24,8 +27,16 @@ def test_torque_in_coarse_steps(signals, torque, found):
     step = 0.8 * torque[:, 0].std()
     coarse = np.column_stack([np.round(torque[:, 0] / step) * step, torque[:, 1]])
     told = {s.check: s for s in found(signals, coarse)}
-    assert told["coarse_torque"].joints == (1,) and told["coarse_torque"].certainty == "suspected"
+    assert told["coarse_torque"].joints == (1,) and told["coarse_torque"].certainty == "noted"
     assert "clipped_torque" not in told
+
+
+def test_coarse_torques_are_one_line(signals, torque, found):
+    step = 0.6 * torque.std(axis=0)
+    (told,) = [s for s in found(signals, np.round(torque / step) * step) if "steps" in s.suspicion]
+    assert told.joints == (1, 2) and "shoulder) and joint 2 (elbow)" in told.suspicion
+    assert told.evidence.count("N m (") == 2
+    assert not [s for s in found(signals.take(slice(12)), torque[:12]) if "coarse" in s.check]
 
 
 def test_velocities_in_coarse_steps(signals, torque, found):
@@ -102,3 +113,22 @@ def test_ends_that_were_filled_with_the_last_values_of_all_channels_are_left_out
 
     assert told["constant_torque"].remedy.option == "--drop-repeated"
     assert {check for check, s in told.items() if s.certainty != "noted"} == {"constant_torque"}
+
+
+@pytest.mark.parametrize("value", [0.0, 1.3])
+def test_a_torque_that_never_changes_was_not_recorded(value, arm, recorded):
+    frame = recorded.frame.assign(tau1=value, tau2=-value)
+    for robot in (arm, None):
+        (told,) = check_log(frame, robot).checks
+        assert (told.check, told.certainty, told.remedy) == ("unrecorded_torque", "certain", None)
+    assert "nan" not in str(check_log(frame, arm))
+    with pytest.raises(LogError, match="wrong. The torque was not recorded"):
+        diagnose(RBDRegressor(arm), frame, frame[["tau1", "tau2"]])
+    with pytest.raises(LogError, match="every torque is zero"):
+        diagnose(RBDRegressor(arm), frame, np.zeros((len(frame), 2)), force=True)
+
+
+def test_a_torque_that_does_not_change_at_rest_is_not_missing(signals, found):
+    rests = signals.with_(q=0 * signals.q, dq=0 * signals.dq, ddq=0 * signals.dq)
+    told = {s.check: s.certainty for s in found(rests, np.full(rests.q.shape, 1.3))}
+    assert told == {"constant_torque": "suspected", "still_joint": "noted"}

@@ -43,6 +43,7 @@ def test_stamps_are_certain_only_where_they_do_harm(arm, told_of):
     assert certainties[2e-5].certainty == "noted"
     assert "influence of the stamps is small" in certainties[2e-5].evidence
     assert certainties[1e-3].certainty == "certain"
+    assert "fit of the torque changes by +" in certainties[1e-3].evidence
 
 
 def test_torques_of_a_slower_clock(recorded, told_of):

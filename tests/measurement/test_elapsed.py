@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rows that are not in the order of time, or between which others are missing."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from skidyn.datasets import load_planar_arm, load_scara, make_hidden_effect_log
@@ -33,6 +35,17 @@ def test_shuffled_rows():
     for frame in (far, near):
         told = told_of(frame)["lost_rows"]
         assert told.certainty == "certain" and "not in the order of time" in told.suspicion
+
+
+def test_shuffled_rows_are_in_no_other_unit():
+    """Positions within their limits seem to run over many turns from row to row."""
+    arm = replace(load_planar_arm(), position_limits=np.array([[-2.09, 2.09]] * 2))
+    frame = make_hidden_effect_log(arm, None, n_trajectories=3, duration=4.0, random_state=0).frame
+    frame["q2"] -= (frame["q2"].max() + frame["q2"].min()) / 2
+    frame[["q2", "dq2"]] *= 1.839 / frame["q2"].max()
+    mixed = frame.sample(frac=1, random_state=0).reset_index(drop=True)
+    mixed = mixed.assign(time=np.arange(len(mixed)) / 100).drop(columns="trajectory")
+    assert [*told_of(mixed, arm)] == ["lost_rows"]
 
 
 def test_rows_that_were_lost_under_an_even_clock():

@@ -8,7 +8,7 @@ from skidyn.measurement import (
     rest_share,
     reversals,
 )
-from skidyn.measurement._measures import equal_values
+from skidyn.measurement._measures import equal_values, held_share
 
 TIME = np.arange(2000) * 0.01
 WAVE = np.sin(TIME)
@@ -30,3 +30,8 @@ def test_rest_and_reversals():
 def test_parts_of_one_value_end_with_their_recording():
     begins, ends = equal_values(np.array([3.0, 3, 1, 1, 1, 2]), np.array([0, 0, 0, 0, 1, 1]))
     assert begins.tolist() == [0, 2, 4, 5] and ends.tolist() == [2, 4, 5, 6]
+
+
+def test_few_rows_hold_no_position():
+    for n in range(2, 12):
+        assert held_share(WAVE[:n], np.ones(n - 1, dtype=bool), np.nan) == 0.0

@@ -33,6 +33,8 @@ def test_messages_say_what_to_do(table):
     X, _ = table
     with pytest.raises(ValueError, match="X has\\s+4"):
         next(TrajectoryKFold(5).split(X))
+    with pytest.raises(ValueError, match="a single trajectory.*PhaseKFold"):
+        next(TrajectoryKFold(2).split(X.assign(trajectory=0)))
     with pytest.raises(ValueError, match="give its position"):
         next(TrajectoryKFold(2).split(X.to_numpy()))
 

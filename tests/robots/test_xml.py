@@ -81,6 +81,17 @@ def test_entities_are_never_expanded(chain):
             Robot.from_urdf(declaration + chain(["j"]))
 
 
+@pytest.mark.parametrize("text", ["<robot><link></robot>", robot(link("a"), link("b", "heavy"))])
+def test_errors_name_the_file(tmp_path, text):
+    path = tmp_path / "arm.urdf"
+    path.write_text(text, encoding="utf-8")
+    for read in (Robot.from_file, Robot.from_urdf):
+        with pytest.raises(RobotDescriptionError, match=r"arm\.urdf: "):
+            read(path)
+    with pytest.raises(RobotDescriptionError, match="^(?!.*arm.urdf)"):
+        Robot.from_urdf(text)
+
+
 def test_files_that_a_description_names_are_not_opened(secret, opened, chain):
     secret, names = secret
     assert str(secret) in opened(lambda: open(names[1]).close())

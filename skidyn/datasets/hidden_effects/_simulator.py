@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from skidyn._exceptions import SkidynError
+from skidyn._joint_numbers import joint_numbers
 from skidyn._plain import plain
 from skidyn._signals import Array
 from skidyn.datasets.hidden_effects._friction import FRICTION
@@ -56,7 +57,7 @@ def make_hidden_effect_log(
     robot: Robot,
     effect: EffectSpec = "dahl",
     *,
-    joints: Sequence[int] | None = None,
+    joints: int | Sequence[int] | None = None,
     magnitude: float | None = None,
     noise: Literal["low", "high"] | float = "low",
     n_trajectories: int = 10,
@@ -80,7 +81,7 @@ def make_hidden_effect_log(
     effect : str, sequence of str, mapping or None, default="dahl"
         Hidden effect: a kind of :func:`hidden_effect_kinds`, several of them, a mapping of kinds to
         ``{"joints": [...], "magnitude": ...}``, or None for a log without a hidden effect.
-    joints : sequence of int, optional
+    joints : int or sequence of int, optional
         Joints that have the effect, counted from 1; a suitable choice if None. Pairs take two.
     magnitude : float, default=1.0
         Factor on the usual size, for which the effect is about a quarter of the spread of the
@@ -160,7 +161,7 @@ def hidden_effect_kinds() -> tuple[str, ...]:
 
 
 def _effect_specs(
-    effect: EffectSpec, joints: Sequence[int] | None, magnitude: float | None
+    effect: EffectSpec, joints: int | Sequence[int] | None, magnitude: float | None
 ) -> dict[str, dict[str, Any]]:
     """Joints and magnitude of each requested effect."""
     common = {"joints": joints, "magnitude": 1.0 if magnitude is None else float(magnitude)}
@@ -242,15 +243,16 @@ def _warm_up(time: Array, n_joints: int, rng: np.random.Generator) -> Array:
     return np.asarray(23.0 + gain * (1 - np.exp(-passed / constant)))
 
 
-def _choose_joints(kind: str, joints: Sequence[int] | None, world: World) -> list[int]:
+def _choose_joints(kind: str, joints: int | Sequence[int] | None, world: World) -> list[int]:
     """Joints from 0: the requested ones, or ones on which the effect is visible."""
     n = world.n_joints
     if joints is not None:
+        joints = joint_numbers(joints)
         wrong = [j for j in joints if not 1 <= j <= n]
         if wrong or len(set(joints)) != len(joints):
-            raise SkidynError(f"joints are counted from 1 to {n}, each once; got {list(joints)}.")
+            raise SkidynError(f"joints are counted from 1 to {n}, each once; got {joints}.")
         if kind in PAIRS and len(joints) != 2:
-            raise SkidynError(f"effect {kind!r} couples two joints; got {list(joints)}.")
+            raise SkidynError(f"effect {kind!r} couples two joints; got {joints}.")
         return [j - 1 for j in joints]
     if kind in WHOLE:
         return list(range(n))
