@@ -178,7 +178,8 @@ def _next(answer: dict[str, Any], options: argparse.Namespace) -> list[str]:
     report = shlex.quote(options.out)
     story = answer["story"]
     seen = (story["servo_motion"] or {"findings": []})["findings"]
-    named = [line for line in [*story["findings"], *seen] if line["kind"] != "unknown"]
+    known = [line for line in [*story["findings"], *seen] if line["kind"] != "unknown"]
+    named = [line for line in known if not line.get("guess")]
     lines = []
     if named:
         joints = ",".join(map(str, named[0]["joints"]))
