@@ -45,8 +45,8 @@ NOT_TESTED = (
 )
 NOT_USED = (
     "the learned part is left out: on no joint does it improve held-out trajectories significantly "
-    "(smallest p-value {p_value:.2g}, alpha={alpha:g}), so that the hybrid equals the physics. With "
-    "more trajectories a real gain becomes significant; `gain_` states that of every joint."
+    "(smallest p-value {p_value:.2g}, alpha={alpha:g}), so that the hybrid equals the physics. A "
+    "real gain becomes significant with more trajectories; `gain_` states that of every joint."
 )
 
 
@@ -58,8 +58,8 @@ class HybridRegressor(
     The physics is cross-fitted, so that the learner is trained on the residual of held-out
     trajectories; the learner is also cross-fitted. A learned part is used only if it agrees
     significantly with the residual of held-out trajectories, with a weight reduced by one standard
-    error; if no joint uses it, the hybrid equals the physics, with a warning. Far from the training samples the learned part
-    fades out.
+    error; if no joint uses it, the hybrid equals the physics, with a warning. Far from the training
+    samples the learned part fades out.
 
     Parameters
     ----------
