@@ -79,15 +79,25 @@ def _told(entry: Any) -> _Told:
 
 
 def _designed(options: argparse.Namespace, kinds: Sequence[str]) -> SeparatingMotion:
-    """The motion, from a diagnosis with some kinds of effects."""
+    """The motion, from a diagnosis with some kinds of effects.
+
+    Beside fewer kinds, a weak finding may be another one; then the whole search is repeated.
+    """
+    from skidyn._exceptions import EffectError
     from skidyn.diagnosis import design_separating_motion
 
     # a diagnosis checks the log
     _, model, frame, tau, _ = read_inputs(options, check=False)
-    diagnosis = run_diagnosis(
-        model, frame, tau, options, kinds=kinds, checks=earlier_checks(options)
-    )
-    with working("Designing the motion", options):
-        return design_separating_motion(
-            diagnosis, options.finding, options.rival, duration=options.duration
-        )
+    checks = earlier_checks(options)
+
+    def designed(among: Sequence[str] | None) -> SeparatingMotion:
+        diagnosis = run_diagnosis(model, frame, tau, options, kinds=among, checks=checks)
+        with working("Designing the motion", options):
+            return design_separating_motion(
+                diagnosis, options.finding, options.rival, duration=options.duration
+            )
+
+    try:
+        return designed(kinds)
+    except EffectError:
+        return designed(None)
