@@ -112,6 +112,8 @@ def run(options: argparse.Namespace) -> None:
 
 def _answer(options: argparse.Namespace) -> dict[str, Any]:
     """The results, as values that can be stored."""
+    from skidyn.diagnosis import separable_rivals
+
     of_the_log = options.controller is None
     with noting() as noted:
         try:
@@ -140,7 +142,7 @@ def _answer(options: argparse.Namespace) -> dict[str, Any]:
         "report": diagnosis.to_dict(),
         "story": diagnosis.story(),
         "failures": [asdict(failure) for failure in diagnosis.failures],
-        "rivals": any(finding.rivals for finding in diagnosis.findings),
+        "rivals": any(separable_rivals(f.kind, f.rivals) for f in diagnosis.findings),
         "page": page,
         "told": list(diagnosis.warnings),
         "noted": noted,
@@ -176,7 +178,8 @@ def _next(answer: dict[str, Any], options: argparse.Namespace) -> list[str]:
     report = shlex.quote(options.out)
     story = answer["story"]
     seen = (story["servo_motion"] or {"findings": []})["findings"]
-    named = [line for line in [*story["findings"], *seen] if line["kind"] != "unknown"]
+    known = [line for line in [*story["findings"], *seen] if line["kind"] != "unknown"]
+    named = [line for line in known if not line.get("guess")]
     lines = []
     if named:
         joints = ",".join(map(str, named[0]["joints"]))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
@@ -11,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._commands._input import read_inputs
+from skidyn._commands._kept import noting
 from skidyn._commands._output import print_json
-from skidyn._exceptions import SkidynError
+from skidyn._exceptions import LogWarning, SkidynError
 from skidyn._text import listed
 
 if TYPE_CHECKING:
@@ -26,18 +28,21 @@ FOLDS = 4
 def gate(options: argparse.Namespace) -> bool:
     """Print the ratio of errors of every joint; True if none is above the limit."""
     _check(options)
-    robot, model, frame, tau, _ = read_inputs(options)
     healthy = argparse.Namespace(**{**vars(options), "logs": options.against})
-    _, _, usual_frame, usual_tau, _ = read_inputs(healthy)
-    from skidyn.metrics import drift
-    from skidyn.model_selection import TrajectoryKFold
-
+    with noting() as noted:  # suspicions would hide the error below
+        _, _, usual_frame, usual_tau, _ = read_inputs(healthy)
     n_trajectories = usual_frame["trajectory"].nunique()
     if n_trajectories < 2:
         raise SkidynError(
             "--against has one trajectory, but the usual error is measured on trajectories left "
             "out of the fit: give at least two"
         )
+    for note in noted:
+        warnings.warn(note, LogWarning, stacklevel=2)
+    robot, model, frame, tau, _ = read_inputs(options)
+    from skidyn.metrics import drift
+    from skidyn.model_selection import TrajectoryKFold
+
     folds = TrajectoryKFold(min(FOLDS, n_trajectories)).split(usual_frame, usual_tau)
     result = drift(
         model,

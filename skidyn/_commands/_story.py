@@ -30,10 +30,11 @@ def story_lines(
         yield f"  ! {note}"
     yield ""
     yield from joint_lines(story)
-    if story["findings"]:
-        yield ""
-        yield "What is missing"
     for k, line in enumerate(story["findings"], 1):
+        guess = line.get("guess", False)
+        if k == 1 or guess != story["findings"][k - 2].get("guess", False):
+            yield ""
+            yield "Uncertain, with a confidence below one half" if guess else "What is missing"
         size = f": {line['size']}" if line["size"] else ""
         when = f"; it {line['when']}" if line.get("when") else ""
         yield f"  {k}. {line['what']} on {line['where']}{size}; {line['sure']}{when}"

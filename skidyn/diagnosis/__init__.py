@@ -54,5 +54,9 @@ from skidyn.diagnosis._intervals import parameter_intervals as parameter_interva
 from skidyn.diagnosis._profile import refine as refine
 from skidyn.diagnosis._remainder import noise_level as noise_level
 from skidyn.diagnosis._screen import CANDIDATE_RIDGE as CANDIDATE_RIDGE
+from skidyn.diagnosis._separation import (
+    findings_to_separate as findings_to_separate,
+    separable_rivals as separable_rivals,
+)
 from skidyn.diagnosis._spectrum import find_lines as find_lines
 from skidyn.diagnosis._split import split_effects as split_effects

@@ -164,7 +164,7 @@ def conclude(
                 problem, hypothesis, candidate, q, drop, averaged, intervals, own
             )
             finding.when.extend(acting(problem, candidate.term, own_torque))
-            curves = effect_curves(problem, finding.terms, own_torque, residual)
+            curves = effect_curves(problem, finding.terms, own_torque, residual, finding.variables)
             finding.curves.extend(curves)
             findings.append(finding)
     share = predictable_share(problem, result.fit.residual)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -435,7 +436,11 @@ def _value(name: str, row: dict[str, Any]) -> str:
 
 
 def effect_curves(
-    problem: Problem, terms: Sequence[Term], torque: dict[Term, dict[int, Array]], residual: Array
+    problem: Problem,
+    terms: Sequence[Term],
+    torque: dict[Term, dict[int, Array]],
+    residual: Array,
+    variables: Sequence[str] = (),
 ) -> list[dict[str, Any]]:
     """Effect and partial residual against the effect's main signal, binned.
 
@@ -449,6 +454,8 @@ def effect_curves(
         Contribution of each term to the joints that it reaches, N m or N.
     residual : ndarray of shape (n_samples, n_joints)
         Held-out residual of the final model, N m or N.
+    variables : sequence of str, default=()
+        Signals on which an unknown torque depends.
 
     Returns
     -------
@@ -461,7 +468,7 @@ def effect_curves(
     for j in sorted({j for own in acting.values() for j in own}):
         own = [t for t in terms if j in acting[t]]
         effect = sum(acting[t][j] for t in own)
-        name, x, unit = _main_signal(problem, own[0], j)
+        name, x, unit = _main_signal(problem, own[0], j, variables)
         use = problem.rows.sliding[:, j]
         if use.sum() < 5 * BINS:
             continue
@@ -492,17 +499,22 @@ def effect_curves(
     return curves
 
 
-def _main_signal(problem: Problem, term: Term, joint: int) -> tuple[str, Array, str]:
-    """Signal against which an effect is plotted."""
+def _main_signal(
+    problem: Problem, term: Term, joint: int, variables: Sequence[str] = ()
+) -> tuple[str, Array, str]:
+    """Signal against which an effect is plotted: for an unknown torque, one of its variables."""
     s = problem.signals
-    against = term.effect.drawn_against
-    slides = bool(s.prismatic[joint])
+    usual, at = term.effect.drawn_against, joint
+    own = [match for name in variables if (match := re.fullmatch(r"(q|dq|ddq)(\d+)", name))]
+    if term.effect.nameless and own and f"{usual}{joint + 1}" not in variables:
+        usual, at = own[0][1], int(own[0][2]) - 1
+    slides = bool(s.prismatic[at])
     length = "m" if slides else "rad"
-    if against == "temperature" and s.temperature is not None:
-        return f"temp{joint + 1}", s.temperature[:, joint], "°C"
-    if against == "load" and s.load is not None:
-        return f"load{joint + 1}", s.load[:, joint], "N" if slides else "N m"
-    if against in ("q", "dq", "ddq"):
-        unit = {"q": length, "dq": f"{length}/s", "ddq": f"{length}/s²"}[against]
-        return f"{against}{joint + 1}", getattr(s, against)[:, joint], unit
+    if usual == "temperature" and s.temperature is not None:
+        return f"temp{at + 1}", s.temperature[:, at], "°C"
+    if usual == "load" and s.load is not None:
+        return f"load{at + 1}", s.load[:, at], "N" if slides else "N m"
+    if usual in ("q", "dq", "ddq"):
+        unit = {"q": length, "dq": f"{length}/s", "ddq": f"{length}/s²"}[usual]
+        return f"{usual}{at + 1}", getattr(s, usual)[:, at], unit
     return "time", s.clock, "s"

@@ -80,7 +80,8 @@ def parameter_intervals(
         apart = _half_width(held[:, own]) < np.abs(whole[own])
         # what others are divided by is zero if it may be zero
         has_value = np.array([not c.is_divisor for c in term.coefficients]) | apart
-        value = term.parameters(np.where(has_value, whole[own], 0.0), problem.signals)
+        fitted = np.where(has_value, whole[own], 0.0)
+        value = term.parameters(fitted, problem.signals)
         replicates = []
         # Without its recording an offset of that recording alone is not determined.
         seen = np.all(np.abs(left[:, own]) > 1e-12, axis=1)
@@ -90,12 +91,11 @@ def parameter_intervals(
                 if owner == i:
                     move = coefficients[at + column] - full[at + column]
                     shape[name] = shape[name] * np.exp(move) if log else shape[name] + move
-            replicates.append(
-                term.with_shape(**shape).parameters(
-                    np.where(has_value, whole[own] + coefficients[own] - full[own], 0.0),
-                    problem.signals,
-                )
-            )
+            change = np.where(has_value, coefficients[own] - full[own], 0.0)
+            moved = term.with_shape(**shape)
+            replicates.append(moved.parameters(fitted + change, problem.signals))
+            if term.effect.amplitudes:
+                replicates[-1] |= _along(term, fitted, change)
         not_zero = {
             c.name for c, is_apart in zip(term.coefficients, apart, strict=True) if is_apart
         }
@@ -103,6 +103,8 @@ def parameter_intervals(
             name: _interval(number, [r[name] for r in replicates if name in r], name in not_zero)
             for name, number in value.items()
         }
+        for name in set(term.effect.amplitudes) & set(value):
+            result[term][name] = _not_negative(result[term][name])
     return result
 
 
@@ -134,6 +136,27 @@ def _slopes(
             owners.append((i, shape.name, log))
             spread.append(_spacing(shape))
     return slopes, owners, spread
+
+
+def _along(term: Term, coefficients: Array, change: Array) -> dict[str, float]:
+    """Lengths and angles of pairs of coefficients after a change, to first order.
+
+    A length is always positive and an angle jumps at half a turn, so that their values at changed
+    coefficients are no basis for an interval: a mere turn by the uncertain number of waves, for
+    example, would make the amplitude larger.
+    """
+    here = term.parameters(coefficients)
+    ends = [term.parameters(coefficients + side * STEP * change) for side in (1, -1)]
+    names = [name for name in here if name not in term.shape]
+    return {name: here[name] + (ends[0][name] - ends[1][name]) / (2 * STEP) for name in names}
+
+
+def _not_negative(interval: Any) -> Any:
+    """The interval of a length, which begins at zero if the length may be zero."""
+    if not isinstance(interval, tuple):
+        return interval
+    value, low, high = interval
+    return (value, max(low, 0.0), high)
 
 
 def _norm(torque: dict[int, Array]) -> float:

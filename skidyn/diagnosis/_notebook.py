@@ -88,8 +88,9 @@ def finding_card(finding: Finding) -> str:
 
 def _finding(line: Mapping[str, Any]) -> str:
     size = f": {escape(line['size'])}" if line["size"] else ""
+    guess = "Uncertain: " if line["guess"] else ""
     return (
-        f"<li><b>{escape(line['what'])}</b> on {escape(line['where'])}{size}. "
+        f"<li>{guess}<b>{escape(line['what'])}</b> on {escape(line['where'])}{size}. "
         f"{escape(line['change'])}; {escape(line['sure'])}.</li>"
     )
 

@@ -11,9 +11,9 @@ once with each rival as the truth, and analysed by the same search as the real r
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 from scipy.optimize import OptimizeResult, differential_evolution
@@ -22,7 +22,7 @@ from skidyn._exceptions import EffectError
 from skidyn._progress import tell
 from skidyn._signals import Array, Signals, read_signals
 from skidyn._text import listed
-from skidyn.diagnosis._hypothesis import Hypothesis
+from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, least_sure
 from skidyn.diagnosis._rule import Settings
 from skidyn.diagnosis._search import search
 from skidyn.effects import Term, get_effect
@@ -30,6 +30,7 @@ from skidyn.evidence import Fit, Problem, hysteresis_joints, make_problem
 from skidyn.excitation import fourier, product, rest_window
 
 if TYPE_CHECKING:
+    from skidyn.diagnosis._findings import Finding
     from skidyn.diagnosis._result import Diagnosis
 
 #: Harmonics of the series, and lowest and highest base frequency in Hz.
@@ -42,6 +43,19 @@ BLEND = 0.5
 LEAST_GAIN = 20.0
 #: Number of trajectories of the simulated check, and rounds and size of the evolution.
 TRAJECTORIES, ROUNDS, POPULATION = 4, 12, 6
+
+
+class _WithRivals(Protocol):
+    """A finding, or what a report tells of it."""
+
+    @property
+    def kind(self) -> str: ...
+
+    @property
+    def rivals(self) -> Sequence[str]: ...
+
+
+_Finding = TypeVar("_Finding", bound=_WithRivals)
 
 
 @dataclass(frozen=True)
@@ -224,7 +238,7 @@ def design_separating_motion(
     diagnosis : Diagnosis
         Diagnosis with the finding.
     kind : str, optional
-        Kind of the finding; by default the first one that has a rival.
+        Kind of the finding; by default the first one that has a rival of the catalogue.
     rival : str, optional
         The other explanation; by default its closest rival.
     duration : float, s, default=20
@@ -286,36 +300,117 @@ def design_separating_motion(
     )
 
 
+def separable_rivals(kind: str, rivals: Iterable[str]) -> list[str]:
+    """Rivals of a finding from which a motion can separate it.
+
+    Unknown functions predict no torque on other motion, and settings of a servo are no torque.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of the finding.
+    rivals : iterable of str
+        Kinds from which the log cannot separate it.
+
+    Returns
+    -------
+    list of str
+        In the given order; empty for a finding that a motion cannot separate.
+    """
+    if kind == UNKNOWN or get_effect(kind).of_servo:
+        return []
+    return [rival for rival in rivals if rival != UNKNOWN and not get_effect(rival).of_servo]
+
+
+def findings_to_separate(
+    findings: Sequence[_Finding], kind: str | None = None, rival: str | None = None
+) -> list[_Finding]:
+    """Findings that a motion may separate from a rival, those with the announced rival first.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+        Findings of a diagnosis, or what a report tells of them: ``kind`` and ``rivals``.
+    kind : str, optional
+        Kind of the finding.
+    rival : str, optional
+        Kind of the rival, which may also be one that explains less; else one of :attr:`rivals`.
+
+    Returns
+    -------
+    list of Finding
+        At least one.
+
+    Raises
+    ------
+    EffectError
+        There is none.
+    """
+    rivals = [separable_rivals(f.kind, f.rivals) for f in findings]
+    asked = [kind in (None, f.kind) for f in findings]
+    pairs = list(zip(findings, rivals, asked, strict=True))
+    if rival is None:
+        chosen = [f for f, known, is_asked in pairs if is_asked and known]
+    else:
+        able = [
+            (f, known)
+            for f, known, is_asked in pairs
+            if is_asked and f.kind != rival and separable_rivals(f.kind, [rival])
+        ]
+        chosen = [f for f, _ in sorted(able, key=lambda pair: rival not in pair[1])]
+    if chosen:
+        return chosen
+    told: dict[str, list[str]] = {}
+    for f, known, _ in pairs:
+        if known:
+            told.setdefault(f.kind, []).extend(known)
+    shown = [f"{own} from {listed([*dict.fromkeys(known)], 'or')}" for own, known in told.items()]
+    if not shown:
+        raise EffectError(
+            "there is nothing to separate: no finding has a rival of the catalogue that this data "
+            "cannot separate from it"
+        )
+    raise EffectError(
+        f"no finding {kind or 'other than ' + str(rival)} that a motion could separate from "
+        f"{rival or 'a rival'}; choose one that it can: {'; '.join(shown)}"
+    )
+
+
 def _opponents(
     diagnosis: Diagnosis, kind: str | None, rival: str | None
 ) -> tuple[Hypothesis, Hypothesis]:
-    """The finding and another explanation of its ranking."""
-    known = []
-    findings = {f.kind: f for f in diagnosis.findings}
-    for own in diagnosis.result.findings:
-        if own.kind not in findings:
-            continue
-        others = [h for h in own.others if h.kind != "unknown"]
-        known.append(f"{own.kind} against {', '.join(h.kind for h in others) or 'nothing'}")
-        if kind not in (None, own.kind):
-            continue
-        names = [rival] if rival else list(findings[own.kind].rivals)
-        for other in others:
+    """The finding, as it was compared, and the rival."""
+    compared: list[str] = []
+    for finding in findings_to_separate(diagnosis.findings, kind, rival):
+        names = [rival] if rival else separable_rivals(finding.kind, finding.rivals)
+        for own, other in _compared(diagnosis, finding):
             if other.kind in names:
                 return own, other
-    asked = f"finding {kind}" if kind else "finding"
-    wanted = f"the rival {rival}" if rival else "a rival"
+            compared += separable_rivals(own.kind, [other.kind])
+    told = listed([*dict.fromkeys(compared)]) or "no other effect"
     raise EffectError(
-        f"no {asked} with {wanted}; the search compared: " + ("; ".join(known) or "nothing")
+        f"the search has not compared {kind or 'a finding'} with {rival or 'a rival'}, only with "
+        f"{told}; choose one of those as rival"
     )
+
+
+def _compared(diagnosis: Diagnosis, finding: Finding) -> Iterator[tuple[Hypothesis, Hypothesis]]:
+    """What was compared on the joints of a finding, the best first."""
+    for found in diagnosis.result.findings:
+        if not any(c.term in finding.terms for c in found.candidates):
+            continue
+        # an effect on several joints may have other rivals on each of them
+        alone = least_sure(found, [j - 1 for j in finding.joints])
+        for own in (found, alone):
+            yield from ((own, h) for h in own.others if set(own.joints) & set(h.joints))
 
 
 def _duel(diagnosis: Diagnosis, first: Hypothesis, second: Hypothesis, duration: float) -> _Duel:
     problem, robot = diagnosis.problem, diagnosis.problem.robot
     assert robot is not None
-    findings = diagnosis.result.findings
-    rest = [c.term for h in findings if h is not first for c in h.candidates]
-    rest = [t for t in rest if t.effect.search != "spectrum"]
+    judged = {c.term for c in first.candidates}
+    found = [c.term for h in diagnosis.result.findings for c in h.candidates]
+    rest = [t for t in found if t not in judged and t.effect.search != "spectrum"]
     terms: list[list[Term]] = [
         [*problem.terms, *rest, *(c.term for c in h.candidates)] for h in (first, second)
     ]

@@ -21,6 +21,7 @@ from skidyn._text import (
 )
 from skidyn.diagnosis._failures import FAILS
 from skidyn.diagnosis._findings import course_told, rival_title, sites_told, spans_told
+from skidyn.diagnosis._hypothesis import UNKNOWN
 from skidyn.diagnosis._rule import GUESS
 from skidyn.diagnosis._servo_motion import servo_motion_told
 from skidyn.effects import get_effect
@@ -146,10 +147,9 @@ def _verdict(
     material = [row["joint"] for row in rows if row["material"]]
     lines = _grouped(cards)
     if lines:
-        nameless = [line for line in lines if line["kind"] == "unknown"]
-        guesses = [line for line in lines if line["guess"] and line not in nameless]
-        told = [line for line in lines if line not in guesses]
-        named = len(told) - len(nameless)
+        guesses = [line for line in lines if line["guess"]]
+        told = [line for line in lines if not line["guess"]]
+        nameless = [line for line in told if line["kind"] == UNKNOWN]
         mark = "?" if nameless or material else "!"
         text = (
             f"The effect of adding {'it' if len(lines) == 1 else 'them'} on the held-out error is "
@@ -177,17 +177,17 @@ def _verdict(
         if guesses:
             verb = "is uncertain" if len(guesses) == 1 else "are uncertain"
             open_ends = f"; {len(guesses)} more {verb}{open_ends}"
-        what = [f"{named} known effect{'s' if named > 1 else ''}"] if named else []
-        what += ["an unknown effect"] if nameless else []
-        verb = "is" if named + bool(nameless) == 1 else "are"
-        headline = f"{listed(what)} {verb} missing, the largest being {top}{open_ends}"
-        return mark, headline[:1].upper() + headline[1:], text
+        what = _counted(len(told) - len(nameless), len(nameless))
+        missing = (
+            f"{what} is missing:" if len(told) == 1 else f"{what} are missing, the largest being"
+        )
+        return mark, f"{missing} {top}{open_ends}", text
     if material:
         return (
             "?",
             f"An unknown effect is missing on {joints_told(material)}",
             "The error there is much larger than the noise, and no effect of the catalogue "
-            "explains it. Details are given under “Remaining error”.",
+            "explains it.",
         )
     if coloured:
         text = (
@@ -203,6 +203,15 @@ def _verdict(
     else:
         text = "The held-out error of every joint is at the noise level."
     return SOUND, "Nothing significant is missing", text
+
+
+def _counted(known: int, unknown: int) -> str:
+    """Numbers of known and of unknown effects, as the beginning of a sentence."""
+    what = [f"{known} known effect{'s' if known > 1 else ''}"] if known else []
+    if unknown:
+        what.append("an unknown effect" if unknown == 1 else f"{unknown} unknown effects")
+    counted = listed(what)
+    return counted[:1].upper() + counted[1:]
 
 
 def _what_and_where(line: dict[str, Any]) -> str:
@@ -255,18 +264,22 @@ def _line(diagnosis: Diagnosis, k: int, rows: Sequence[dict[str, Any]]) -> dict[
         "beside": finding.rivals,
         "share": share,
         "doubtful": bool(finding.rivals) or share < SURE,
-        "guess": share < GUESS,
+        "guess": finding.kind != UNKNOWN and share < GUESS,
         "change": change,
     }
 
 
 def _grouped(cards: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One line for all joints on which one step added one effect."""
+    """One line for all joints on which one step added one effect; what is uncertain last.
+
+    Joints on which it is more likely wrong than right have a line of their own.
+    """
     groups: dict[Any, list[dict[str, Any]]] = {}
     for card in cards:
-        key = (card["kind"], card["step"]) if card["step"] is not None else card["card"]
-        groups.setdefault(key, []).append(card)
-    return [group[0] if len(group) == 1 else _together(group) for group in groups.values()]
+        alike = (card["kind"], card["step"], card["guess"])
+        groups.setdefault(card["card"] if card["step"] is None else alike, []).append(card)
+    lines = [group[0] if len(group) == 1 else _together(group) for group in groups.values()]
+    return sorted(lines, key=lambda line: bool(line["guess"]))
 
 
 def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -294,17 +307,24 @@ def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _least_sure(group: Sequence[dict[str, Any]]) -> str:
-    """Text of the joints that are least sure, and the confidence of those with other rivals."""
+    """Text of the joints that are least sure, and the confidence of those with other rivals.
+
+    If the confidence of these joints differs, it is given as a range.
+    """
     least = min(group, key=lambda card: card["share"])
     others = [card for card in group if card["beside"] != least["beside"]]
     if not others or least["share"] > min(card["share"] for card in others) - NOTICED:
-        return str(least["sure"])
+        most = max(card["share"] for card in group)
+        if most < least["share"] + NOTICED:
+            return str(least["sure"])
+        low, high = map(_percent, (least["share"], most))
+        return str(least["sure"]).replace(f"confidence {low}", f"confidence {low} to {high}", 1)
     alike = [card for card in group if card["beside"] == least["beside"]]
     own, rest = (
         joints_told(sorted({j for c in cards for j in c["joints"]})) for cards in (alike, others)
     )
     share = min(card["share"] for card in others)
-    return f"on {rest} confidence {min(share, 0.99):.0%}; on {own} {least['sure']}"
+    return f"on {rest} confidence {_percent(share)}; on {own} {least['sure']}"
 
 
 def _first_clear(weights: Sequence[Sequence[float]]) -> int:
@@ -326,7 +346,7 @@ def _step(history: Sequence[dict[str, Any]], finding: Finding) -> int | None:
 
 def is_setting(finding: Finding) -> bool:
     """Whether a finding is a setting of the servo and not a torque of the model."""
-    return finding.kind != "unknown" and get_effect(finding.kind).of_servo
+    return finding.kind != UNKNOWN and get_effect(finding.kind).of_servo
 
 
 def confidence(finding: Finding) -> float | None:
@@ -341,14 +361,14 @@ def sure(finding: Finding) -> str:
     family = finding.title.partition(", best described by ")
     named = f" that it is {inside(family[0])}" if family[1] else ""
     named += " and acts on these joints" * bool(finding.elsewhere)
-    text = "" if share is None else f"confidence {min(share, 0.99):.0%}{named}"
+    text = "" if share is None else f"confidence {_percent(share)}{named}"
     if finding.elsewhere:
         sites = f"on {sites_told(finding.elsewhere)} it would explain the data equally well"
         text += f"{'; ' if text else ''}{sites}"
     if finding.rivals:
         rivals = listed([rival_title(kind) for kind in finding.rivals], "or")
         text += f"{'; ' if text else ''}this data cannot separate it from {rivals}"
-    elif finding.kind == "unknown":
+    elif finding.kind == UNKNOWN:
         text = "no effect of the catalogue explains it"
         if finding.nearest:
             closest, share = rival_title(finding.nearest["kind"]), finding.nearest["share"]
@@ -358,6 +378,11 @@ def sure(finding: Finding) -> str:
     elif not text:
         text = "no other effect explains it as well"
     return text
+
+
+def _percent(share: float) -> str:
+    """A confidence in per cent, which is never complete."""
+    return f"{min(share, 0.99):.0%}"
 
 
 def sizes(finding: Finding) -> str:

@@ -115,16 +115,18 @@ def describe_unknowns(
         effect = term.effect
         assert isinstance(effect, NamelessEffect)
         guessed = effect.variables(term.places[0], dict(term.shape))
+        # a force at the tool reaches joints that never slide, where no shape is determined
+        places = [j for j in term.places if problem.rows.sliding[:, j].any()]
         # the position of the tool, and the recording, are not among the signals that are tested
         if "robot" in effect.needs or "trajectory" in guessed:
-            for joint in term.places:
+            for joint in places:
                 own = guessed if "trajectory" in guessed else (f"q{joint + 1}",)
                 shape = _shape(problem, term, joint, whole[span], left[:, span], own)
                 found.append(UnknownTorque(joint + 1, guessed, (), shape, None))
             continue
         known = np.ones(len(whole), dtype=bool)
         known[span] = False
-        for joint in term.places:
+        for joint in places:
             without = _Remainder([d[:, known] for d in design], sigma, joint)
             rows = without(problem.term_rows(term)[joint])
             explained = rows @ whole[span]

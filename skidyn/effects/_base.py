@@ -49,6 +49,9 @@ class Effect:
         is a setting of a servo, which has no columns.
     nameless : bool
         Whether it represents an effect that is not in the catalogue (``unknown``).
+    amplitudes : tuple of str
+        Parameters that are the length of two coefficients each, as the amplitude of a wave; its
+        other parameters that are no shapes are their angles.
     drawn_against : {"q", "dq", "ddq", "load", "temperature", "time"}
         Signal against which it is plotted in reports.
     family : str
@@ -136,6 +139,7 @@ class Effect:
         Literal["grid", "spectrum", "trajectories", "clock", "screened", "given", "servo"]
     ] = "grid"
     nameless: ClassVar[bool] = False
+    amplitudes: ClassVar[tuple[str, ...]] = ()
     drawn_against: ClassVar[str] = "q"
     family: ClassVar[str] = ""
     needs: ClassVar[tuple[str, ...]] = ()

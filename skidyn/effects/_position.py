@@ -36,6 +36,7 @@ class PositionDependentFriction(Effect):
     #: Places that are tried, and widths, as shares of the travel.
     spots = tuple({"place": k / 8, "width": w} for w in (0.06, 0.15) for k in range(1, 8))
     forms = ({"overtone": 1.0}, {"viscous": 1.0}, *spots)
+    amplitudes = ("A", "Av", "A2")
     simplicity = 22
     rivals = ("load_dependent_friction", "coulomb")
     separating_motion = "slow sweeps over the whole travel in both directions"
@@ -117,6 +118,7 @@ class TorqueRipple(Effect):
     # Averaging over windows of time would remove a fast ripple, so it is searched in the residual
     # at the full rate, as a line in its spectrum over joint angle.
     search = "spectrum"
+    amplitudes = ("A", "A2", "A3", "A4", "A5")
     simplicity = 20
     rivals = ("position_dependent_friction",)
     separating_motion = "slow constant-speed sweeps, so that the ripple stays below the sample rate"

@@ -43,6 +43,11 @@ NOT_TESTED = (
     "distinguished from chance. Record more, split a long recording of a motion that does not "
     "repeat into trajectories, or set alpha=1 to keep any part that helps on held-out data."
 )
+NOT_USED = (
+    "the learned part is left out: on no joint does it improve held-out trajectories significantly "
+    "(smallest p-value {p_value:.2g}, alpha={alpha:g}), so that the hybrid equals the physics. A "
+    "real gain becomes significant with more trajectories; `gain_` states that of every joint."
+)
 
 
 class HybridRegressor(
@@ -53,8 +58,8 @@ class HybridRegressor(
     The physics is cross-fitted, so that the learner is trained on the residual of held-out
     trajectories; the learner is also cross-fitted. A learned part is used only if it agrees
     significantly with the residual of held-out trajectories, with a weight reduced by one standard
-    error; otherwise the hybrid equals the physics. Far from the training samples the learned part
-    fades out.
+    error; if no joint uses it, the hybrid equals the physics, with a warning. Far from the training
+    samples the learned part fades out.
 
     Parameters
     ----------
@@ -227,6 +232,10 @@ class HybridRegressor(
             self.p_value_[:] = 1.0
             if self.alpha < 1:
                 warnings.warn(NOT_TESTED, UserWarning, stacklevel=4)
+        elif not self.learned_weight_.any():
+            least = float(self.p_value_.min())
+            told = NOT_USED.format(p_value=least, alpha=self.alpha)
+            warnings.warn(told, UserWarning, stacklevel=4)
         self.physics_ = _fit(clone(physics), seen_by_physics, torque, weight, progress)
         self.learner_ = None
         if self.learned_weight_.any():

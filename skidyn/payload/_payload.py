@@ -40,6 +40,8 @@ PASSES = 3
 #: contradiction is reported, and standard error, as a share, beyond which a joint is too imprecise
 #: for it.
 DISAGREES, LARGEST_ERROR = 4.0, 0.3
+#: Share of the mass below which a joint contradicts it by more than a wrong drive gain would.
+LEAST_SHARE = 0.5
 #: Radius in m of the sphere used for a payload whose inertia the data does not determine.
 RADIUS = 0.05
 
@@ -451,21 +453,25 @@ def _by_joint(runs: Runs, body: Array) -> tuple[Array, Array]:
 
 
 def _disagreement(shares: Array, errors: Array) -> list[str]:
-    """A note if the estimates of the joints differ by more than their errors."""
-    felt = np.flatnonzero(np.isfinite(shares) & (errors < LARGEST_ERROR))
-    if len(felt) < 2:
+    """A note if the estimate of a joint differs from the common one by more than its error.
+
+    The common one is 1. A mean of the precise joints is not: joints without a payload agree with
+    each other, and contradict the mass that the others have determined.
+    """
+    felt = np.flatnonzero(np.isfinite(shares))
+    precise = felt[errors[felt] < LARGEST_ERROR]
+    if len(felt) < 2 or len(precise) == 0:
         return []
-    weight = 1.0 / (errors[felt] + 1e-12) ** 2
-    mean = float(weight @ shares[felt] / weight.sum())
-    distance = np.abs(shares[felt] - mean) / (errors[felt] + 1e-12)
+    distance = np.abs(shares[precise] - 1.0) / (errors[precise] + 1e-12)
     worst = int(np.argmax(distance))
     if distance[worst] < DISAGREES:
         return []
-    j = felt[worst]
+    j = precise[worst]
+    also = "" if shares[j] > LEAST_SHARE else ", and whether there is a payload at all,"
     return [
         f"Joint {j + 1} alone gives {100 * shares[j]:.0f} % of this mass, {distance[worst]:.1f} "
-        "standard errors from the estimate of all joints: check its drive gain before using the "
-        "mass."
+        f"standard errors from the estimate of all joints: check its drive gain{also} before using "
+        "the mass."
     ]
 
 

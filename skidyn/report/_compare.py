@@ -310,10 +310,12 @@ def _sentence(report: dict[str, Any]) -> str:
     )
     if mean is not None:
         less = sum(row["ratio"] < 1 for row in report["ratios"])
-        text += (
-            f"As given, {second} has {_change(mean, first)} in the mean over joints; its error is "
-            f"smaller on {less or 'none'} of {len(report['ratios'])} joints. "
+        over = (
+            f" in the mean over joints; its error is smaller on {less or 'none'} of "
+            f"{len(report['ratios'])} joints"
         )
+        several = len(report["ratios"]) > 1
+        text += f"As given, {second} has {_change(mean, first)}{over if several else ''}. "
     shared = [row for row in report["findings"] if len(row["in"]) == 2]
     return text + (f"Missing in both: {_brief(shared)}." if shared else "")
 

@@ -12,6 +12,7 @@ from skidyn._text import digits, inside, joints_told, listed, raised
 from skidyn.effects import get_effect, list_effects
 from skidyn.report._glossary import meaning
 from skidyn.report._picture import Canvas, Summary, pictures
+from skidyn.report._words import counted
 
 #: In this order: each script uses what the ones before it define.
 SCRIPTS = ("static/common.js", "static/figures.js", "static/panels.js")
@@ -55,7 +56,7 @@ def _environment() -> Any:
         loader=jinja2.FunctionLoader(_resource),
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined,
     )  # fmt: skip
-    own = number, percent, change, chance, words, breakable, capital, short, mathml
+    own = number, percent, change, chance, words, breakable, capital, short, mathml, counted
     for told in (*own, joints_told, listed, meaning, raised):
         environment.filters[told.__name__] = told
     return environment
@@ -107,9 +108,10 @@ def capital(text: str) -> str:
 
 
 def breakable(name: str) -> Any:
-    """A name with line breaks permitted after underscores rather than inside a word."""
+    """A name with line breaks permitted after underscores and commas, not inside a word."""
     markup = import_optional("markupsafe", extra="report").Markup
-    return markup("_<wbr>").join(name.split("_"))
+    parts = (markup("_<wbr>").join(part.split("_")) for part in name.split(","))
+    return markup(",<wbr>").join(parts)
 
 
 def mathml(formula: str) -> Any:

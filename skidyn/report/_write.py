@@ -9,6 +9,7 @@ from typing import Any
 
 from skidyn._writing import write_text
 from skidyn.report._page import render_page
+from skidyn.report._words import counted
 
 
 def render_html(summary: dict[str, Any]) -> str:
@@ -39,12 +40,13 @@ def render_html(summary: dict[str, Any]) -> str:
     report = summary["report"]
     page = report["schema"].removeprefix("skidyn.").partition("/")[0]
     if page == "fleet":
-        sub = f"{len(report['robots'])} robots · {len(report['columns'])} coefficients"
+        columns = counted(len(report["columns"]), "coefficient")
+        sub = f"{counted(len(report['robots']), 'robot')} · {columns}"
     elif page == "comparison":
         sides = (f"{side['name']} ({_size(side, ', ')})" for side in report["sides"])
-        sub = f"{' against '.join(sides)} · {len(report['joints'])} joints"
+        sub = f"{' against '.join(sides)} · {counted(len(report['joints']), 'joint')}"
     else:
-        sub = f"{len(report['joints'])} joints · {_size(summary, ' · ')}"
+        sub = f"{counted(len(report['joints']), 'joint')} · {_size(summary, ' · ')}"
     return render_page(page, summary, sub)
 
 
@@ -74,5 +76,5 @@ def write_html(path: str | os.PathLike[str], summary: dict[str, Any]) -> Path:
 
 def _size(log: dict[str, Any], between: str) -> str:
     """Numbers of trajectories and samples of a log."""
-    n = log["n_trajectories"]
-    return f"{n} trajector{'y' if n == 1 else 'ies'}{between}{log['n_samples']:,} samples"
+    parts = counted(log["n_trajectories"], "trajectory"), counted(log["n_samples"], "sample")
+    return between.join(parts)

@@ -58,3 +58,17 @@ def test_a_worn_joint_fails_by_name(here, capsys, tmp_path):
 def test_what_is_missing_is_said(here, capsys, words, complaint):
     assert cli.main(["compare", "tonight.csv", *ARM, *words]) == cli.BAD_INPUT
     assert complaint in capsys.readouterr().err
+
+
+def test_one_healthy_recording_is_refused_in_one_line(here, capsys):
+    frame = pandas.read_csv("healthy.csv")
+    one = frame[frame["trajectory"] == 1].copy()
+    one["tau2"] = -one["tau2"]  # which a check would tell at length
+    one.to_csv("one.csv", index=False)
+    words = ["compare", "tonight.csv", *ARM, "--fail-above", "2", "--against"]
+    assert cli.main([*words, "one.csv"]) == cli.BAD_INPUT
+    told = capsys.readouterr().err
+    assert "give at least two" in told and "warning" not in told
+    frame.assign(tau2=-frame["tau2"]).to_csv("flipped.csv", index=False)
+    assert cli.main([*words, "flipped.csv"]) == cli.FAILED
+    assert "warning: " in capsys.readouterr().err

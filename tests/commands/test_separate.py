@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import json
+
 import pandas as pd
-import pytest
 
 from skidyn import cli
+from skidyn.exceptions import EffectError
 
 
 def test_the_motion_and_its_worth(report, run, tmp_path, monkeypatch):
@@ -23,11 +25,40 @@ def test_the_motion_and_its_worth(report, run, tmp_path, monkeypatch):
     assert pd.read_csv(out)["time"].iloc[-1] < 10
 
 
-@pytest.mark.slow
-def test_rivals_that_were_not_compared(report, tmp_path, capsys):
-    out = tmp_path / "motion.csv"
-    words = ["separate", "--from", report, "--out", out, "--effect", "payload"]
-
+def refused(report, out, capsys, *more):
+    words = ["separate", "--from", report, "--out", out, *more]
     assert cli.main([*map(str, words)]) == cli.BAD_INPUT
-    assert "the search compared" in capsys.readouterr().err
     assert not out.exists()
+    return capsys.readouterr().err
+
+
+def test_a_report_without_rivals_is_refused_without_a_search(report, tmp_path, capsys, monkeypatch):
+    def search(*_, **__):
+        raise AssertionError("the report tells it")
+
+    monkeypatch.setattr("skidyn._commands._separate.run_diagnosis", search)
+    out = tmp_path / "motion.csv"
+    told = refused(report, out, capsys, "--effect", "payload")
+    assert "no finding payload" in told and "maxwell_slip from dahl" in told
+
+    content = json.loads(report.read_text("utf-8"))
+    for effect in content["effects"]:
+        effect["rivals"] = ["unknown"]
+    bare = report.with_name("bare.json")
+    bare.write_text(json.dumps(content), encoding="utf-8")
+    assert "nothing to separate: no finding has a rival" in refused(bare, out, capsys)
+
+
+def test_effects_of_the_report_are_searched_before_all_others(report, tmp_path, monkeypatch):
+    searched = []
+
+    def search(*_, kinds, **__):
+        searched.append(kinds)
+        raise EffectError("found something else")
+
+    monkeypatch.setattr("skidyn._commands._separate.run_diagnosis", search)
+    out = tmp_path / "motion.csv"
+    assert cli.main(["separate", "--from", str(report), "--out", str(out)]) == cli.BAD_INPUT
+    among, every = searched
+    assert {"dahl", "maxwell_slip"} <= set(among) <= {"dahl", "lugre", "maxwell_slip"}
+    assert every is None

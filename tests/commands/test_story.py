@@ -26,17 +26,21 @@ def short(work, tmp_path_factory):
 
 @pytest.fixture
 def shown(short, monkeypatch, capsys):
-    """Lines printed of a made-up story, without the next command; only a terminal breaks them."""
+    """Lines printed of a made-up story; only a terminal breaks them.
+
+    Next commands are left out unless there are more options.
+    """
     words, found = short
 
-    def show(story, failures=(), columns=120, terminal=False):
+    def show(story, failures=(), columns=120, terminal=False, more=()):
         told = copy.copy(found)
         told.story, told.failures = lambda: story, list(failures)
         monkeypatch.setattr(diagnosis, "diagnose", lambda *args, **options: told)
         monkeypatch.setenv("COLUMNS", str(columns))
         monkeypatch.setattr(sys.stdout, "isatty", lambda: terminal)
-        assert cli.main(["diagnose", *words]) == cli.DONE
-        return capsys.readouterr().out.partition("next: ")[0].splitlines()
+        assert cli.main(["diagnose", *words, *more]) == cli.DONE
+        out = capsys.readouterr().out
+        return (out if more else out.partition("next: ")[0]).splitlines()
 
     return show
 
@@ -67,6 +71,21 @@ def test_the_verdict_comes_first_and_each_thing_once(story, shown):
     for part in ("23 repeated rows", "k = 3.5", "Joint 1 is at its noise.", "axis2 (2)"):
         assert text.count(part) == 1
     assert "axis1" not in text
+
+
+def test_what_is_uncertain_is_told_apart_and_not_proposed(story, shown, tmp_path):
+    (sure,) = story["findings"]
+    sure |= {"kind": "spring", "joints": [2], "guess": False}
+    guess = sure | {"what": "Torque ripple", "kind": "torque_ripple", "guess": True}
+    story |= {"servo_motion": None, "findings": [sure, guess]}
+    more = ("--out", str(tmp_path / "report.json"))
+    lines = shown(story, more=more)
+    at = [lines.index(head) for head in lines if head.startswith(("What is", "Uncertain"))]
+    assert lines[at[0] + 1].startswith("  1. Spring")
+    assert lines[at[1] + 1].startswith("  2. Torque ripple")
+    assert [line for line in lines if "--effect" in line][0].endswith("spring --joints 2")
+    story["findings"] = [guess]
+    assert not [line for line in shown(story, more=more) if "--effect" in line]
 
 
 def test_the_simulated_motion_is_told_where_it_was_asked_for(story, shown):

@@ -6,6 +6,8 @@ import json
 import numpy as np
 
 from skidyn.diagnosis import diagnose, notes
+from skidyn.diagnosis._findings import effect_curves
+from skidyn.effects import Term
 from skidyn.identification import RBDRegressor
 
 
@@ -33,6 +35,19 @@ def test_the_curve_is_that_of_a_spring(missing):
         and abs(slope / missing.findings[0].parameters["k"]["value"] - 1) < 0.05
     )
     assert (curve["low"] <= curve["high"]).all()
+
+
+def test_an_unknown_torque_is_drawn_over_a_signal_on_which_it_depends(missing):
+    problem, term = missing.problem, Term("friction_over_position", (1,))
+    torque, residual = {term: {0: problem.signals.dq[:, 0]}}, 0 * problem.torque
+    drawn = {
+        variables: effect_curves(problem, [term], torque, residual, variables)[0]
+        for variables in ((), ("dq1",), ("dq1", "q1"), ("dq2",), ("tool position",))
+    }
+    told = [curve["variable"] for curve in drawn.values()]
+    assert told == ["q1", "dq1", "q1", "dq2", "q1"]
+    assert drawn["dq1",]["unit"] == "rad/s"
+    np.testing.assert_allclose(drawn["dq1",]["effect"], drawn["dq1",]["x"])
 
 
 def test_the_known_effect_that_comes_closest_to_an_unknown_torque(complete_log):

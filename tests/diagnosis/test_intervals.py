@@ -6,6 +6,7 @@ import pytest
 
 from skidyn.datasets import load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose, parameter_intervals
+from skidyn.effects import Term
 from skidyn.identification import RBDRegressor
 
 
@@ -27,6 +28,17 @@ def test_shapes_that_are_held_make_intervals_no_wider(missing):
             if isinstance(interval, tuple):
                 wide = free[term][name]
                 assert interval[2] - interval[1] <= 1.01 * (wide[2] - wide[1])
+
+
+def test_a_wave_that_may_be_absent_has_an_amplitude_from_zero(missing):
+    problem, noise = missing.problem, missing.result.fit.noise
+    wave = Term("position_dependent_friction", (1,), {"n": 1.0})
+    terms = [*missing.result.fit.terms, wave]
+    for shapes in (True, False):
+        told = parameter_intervals(problem, terms, noise, shapes)[wave]
+        value, low, high = told["A"]
+        assert low == 0.0 < value < high
+        assert value < high - value
 
 
 @pytest.mark.slow

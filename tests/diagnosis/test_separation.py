@@ -3,11 +3,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.diagnosis import design_separating_motion, diagnose
+from skidyn.diagnosis import design_separating_motion, diagnose, findings_to_separate
+from skidyn.effects import Term
 from skidyn.exceptions import EffectError
 from skidyn.identification import RBDRegressor
 
@@ -82,5 +86,49 @@ def test_a_rival_that_contains_the_effect_cannot_be_told_from_it():
 
 @pytest.mark.slow
 def test_rivals_that_were_not_compared_are_refused_with_those_that_were(diagnosis):
-    with pytest.raises(EffectError, match="compared: .* against .*dahl|compared: dahl"):
-        design_separating_motion(diagnosis, "payload", "dahl")
+    with pytest.raises(EffectError, match="not compared maxwell_slip with payload, only with"):
+        design_separating_motion(diagnosis, "maxwell_slip", "payload")
+
+
+def told(kind, *rivals):
+    return SimpleNamespace(kind=kind, rivals=rivals)
+
+
+def test_of_several_findings_of_one_kind_that_with_a_rival_is_chosen():
+    findings = [told("unknown", "spring"), told("coulomb"), told("coulomb", "unknown", "stribeck")]
+
+    assert findings_to_separate([*findings, told("coulomb")]) == findings[2:]
+    assert findings_to_separate(findings, "coulomb", "stribeck")[0] is findings[2]
+
+
+def test_findings_that_no_motion_separates_are_refused_with_those_that_one_does():
+    unknown = told("unknown", "spring")
+    with pytest.raises(EffectError, match="nothing to separate: no finding has a rival"):
+        findings_to_separate([unknown, told("coulomb", "unknown")])
+    findings = [unknown, told("dahl", "lugre"), told("dahl", "lugre", "maxwell_slip")]
+    with pytest.raises(EffectError, match="no finding spring .* dahl from lugre or maxwell_slip$"):
+        findings_to_separate(findings, "spring")
+
+
+def test_the_rival_of_one_joint_of_an_effect_is_found(missing, monkeypatch):
+    monkeypatch.setattr("skidyn.diagnosis._separation.ROUNDS", 1)
+    monkeypatch.setattr("skidyn.diagnosis._separation.POPULATION", 1)
+    (spring,), (found,) = missing.findings, missing.result.findings
+    first = found.candidates[0]
+    second = replace(first, term=replace(first.term, joints=(1,)))
+    rival = Term("viscous", (2,))
+    other = replace(found, kind="viscous", candidates=(replace(first, term=rival),))
+    alone = replace(found, margin=-1.0, others=(other,))
+    both = replace(found, candidates=(first, second), alone=(alone,), others=())
+    diagnosis = replace(
+        missing,
+        findings=[
+            replace(spring, rivals=("viscous",)),
+            replace(spring, joints=(1,), terms=(second.term,)),
+        ],
+        result=replace(missing.result, findings=[both]),
+    )
+
+    motion = design_separating_motion(diagnosis, duration=3.0)
+
+    assert (motion.kind, motion.rival, motion.joints) == ("spring", "viscous", (2,))

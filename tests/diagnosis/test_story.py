@@ -105,3 +105,52 @@ def test_a_guess_beside_a_sure_name_does_not_lead_the_headline(missing):
     guess = dataclasses.replace(sure, kind="viscous", title="Viscous friction", confidence=0.1)
     story = dataclasses.replace(missing, findings=[guess, sure]).story()
     assert story["headline"] == "Missing: spring on joint 2; possibly viscous friction on joint 2"
+
+
+def told(missing, *found):
+    """The story of findings in their order: kind, joint and confidence."""
+    findings = [
+        dataclasses.replace(
+            missing.findings[0], kind=kind, title=kind, joints=(joint,), confidence=sure
+        )
+        for kind, joint, sure in found
+    ]
+    kinds = dict.fromkeys(kind for kind, *_ in found)
+    steps = [{**missing.history[1], "added": kind, "joints": [1, 2]} for kind in kinds]
+    history = [missing.history[0], *steps]
+    return dataclasses.replace(missing, findings=findings, history=history).story()
+
+
+def test_a_joint_with_a_confidence_below_one_half_is_not_counted_as_missing(missing):
+    ripple = ("torque_ripple", 1, 0.18), ("torque_ripple", 2, 0.9)
+    story = told(missing, *ripple, ("spring", 2, 0.8), ("viscous", 2, 0.3))
+    assert story["headline"].startswith("2 known effects are missing, the largest being ")
+    assert story["headline"].endswith("; 2 more are uncertain")
+    lines = [(line["kind"], line["joints"], line["guess"]) for line in story["findings"]]
+    assert lines == [
+        ("torque_ripple", [2], False),
+        ("spring", [2], False),
+        ("torque_ripple", [1], True),
+        ("viscous", [2], True),
+    ]
+
+
+def test_the_confidence_of_joints_in_one_line_is_a_range(missing):
+    (line,) = told(missing, ("spring", 1, 0.62), ("spring", 2, 0.95))["findings"]
+    assert line["sure"].startswith("confidence 62% to 95%")
+
+
+def test_the_headline_counts_effects_in_words(missing):
+    steps = missing.history[0]["rmse"], missing.history[1]["rmse"]
+    unknown = dataclasses.replace(missing.findings[0], kind="unknown", title="Unknown torque")
+    history = [{"added": None, "joints": [], "rmse": rmse} for rmse in steps]  # a line each
+    one = dataclasses.replace(missing.findings[0], kind="viscous", confidence=0.1)
+
+    def headline(*found):
+        return dataclasses.replace(missing, findings=[*found], history=history).story()["headline"]
+
+    assert headline(unknown, unknown, unknown).startswith(
+        "3 unknown effects are missing, the largest being "
+    )
+    assert headline(unknown, one, one).startswith("An unknown effect is missing: unknown")
+    assert headline(missing.findings[0], one, one).startswith("1 known effect is missing: spring")

@@ -4,8 +4,12 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
+
+from skidyn.diagnosis._unknown import describe_unknowns
+from skidyn.effects import Term, get_effect
 
 
 def test_the_shape_is_a_map_with_a_band_that_holds_the_truth(nameless):
@@ -33,3 +37,14 @@ def test_the_report_holds_tests_shape_and_formula(nameless):
     assert first["formula"]["text"] == diagnosis.unknowns[0].proposal.text
     assert len(first["shape"]["value"]) == 16
     assert {t["variable"] for t in first["tests"] if t["needed"]} == set(first["variables"])
+
+
+def test_a_joint_that_never_slides_has_no_shape_of_a_force_at_the_tool(missing):
+    problem, noise = missing.problem, missing.result.fit.noise
+    sliding = problem.rows.sliding.copy()
+    sliding[:, 0] = False
+    still = replace(problem, rows=replace(problem.rows, sliding=sliding))
+    kind = "force_over_tool_position"
+    term = Term(kind, (1, 2), get_effect(kind).grid(problem.signals, (0, 1))[0])
+    found = describe_unknowns(still, [term], [term], noise)
+    assert [torque.joint for torque in found] == [2]

@@ -52,6 +52,15 @@ def test_one_recording_proves_nothing(make_log):
         hybrid.set_params(cv=ShuffleSplit(2)).fit(X, y)
 
 
+def test_a_learner_that_does_not_improve_is_told(make_log):
+    X, y = make_log(8, 60, hidden=(0.0, 0.0))
+    hybrid = HybridRegressor(LinearRegression(), TREES, cv=4)
+    with pytest.warns(UserWarning, match=r"smallest p-value .*, alpha=0\.05"):
+        hybrid.fit(X, y)
+    assert hybrid.learner_ is None and not hybrid.learned_weight_.any()
+
+
+@pytest.mark.filterwarnings("ignore:the learned part is left out")
 def test_drift_between_recordings_is_not_taken_for_something_learned(make_log):
     kept = 0
     for seed in range(10):

@@ -80,6 +80,17 @@ def test_a_fitted_model_stands_for_unloaded_runs(runs, found):
         identify_payload(log.robot, loaded)
 
 
+def test_joints_that_feel_no_payload_contradict_it_together():
+    robot = load_planar_arm()
+    log = make_hidden_effect_log(robot, None, n_trajectories=6, duration=6.0, random_state=0)
+    carried = log.frame["trajectory"] < 3
+    # the shoulder is loaded, and the elbow is not: no body at the last link does that
+    pull = 0.5 * np.cos(log.frame["q1"]) * carried
+    frame = log.frame.assign(tau1=log.frame["tau1"] + pull)
+    found = identify_payload(robot, frame[carried], frame[~carried], effects=FRICTION)
+    assert "and whether there is a payload at all" in found.text
+
+
 def test_what_the_motion_leaves_open_is_said():
     log = make_hidden_effect_log(
         load_planar_arm(), "payload", n_trajectories=4, duration=6.0, random_state=0

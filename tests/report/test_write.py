@@ -62,3 +62,11 @@ def test_folders_are_made(tmp_path, fakes):
     page = write_html(tmp_path / "a" / "b.html", summarize(fakes.make_diagnosis()))
     assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
     assert write_json(tmp_path / "c" / "d.json", {"a": 1}).read_text() == '{\n  "a": 1\n}\n'
+
+
+def test_one_joint_is_counted_in_the_singular(fakes):
+    one = fakes.make_diagnosis("complete", joint_names=("slide",), n_samples=1500)
+    page = render_html(summarize(one))
+    assert "1 joint · 3 trajectories · 1,500 samples" in page
+    both = summarize_comparison(one, fakes.make_diagnosis("complete", ("slide",)), names=("a", "b"))
+    assert "samples) · 1 joint<" in render_html(both) and "joints" not in both["sentence"]

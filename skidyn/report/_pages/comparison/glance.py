@@ -37,5 +37,7 @@ def _quiet(rows: list[dict[str, Any]]) -> str:
     silent = [row for row in rows if not row["speaks"]]
     if not silent:
         return ""
-    which = "All" if len(silent) == len(rows) else "The other"
-    return f"{which} joints have the same error in both, and it is like the noise."
+    every = "The joint has" if len(rows) == 1 else "All joints have"
+    others = f"The other joint{' has' if len(silent) == 1 else 's have'}"
+    which = every if len(silent) == len(rows) else others
+    return f"{which} the same error in both, and it is like the noise."

@@ -30,6 +30,11 @@ class What(Picture):
                 "title": finding.title,
                 "code": finding.code,
                 "formula": "" if finding.kind == "unknown" else get_effect(finding.kind).formula,
+                "proposals": [
+                    {"joint": u.joint, "text": u.proposal.text}
+                    for u in subject.unknowns
+                    if finding.kind == "unknown" and u.proposal and u.joint in finding.joints
+                ],
                 "notes": notes(finding.kind, finding.parameters),
                 "curves": finding.curves,
                 "maps": residual_maps(subject, finding),
