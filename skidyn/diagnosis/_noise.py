@@ -27,7 +27,7 @@ MEDIAN = 0.6744897501960817
 #: Factor by which differences grow with twice the distance of the samples where these lie within
 #: the time constant of a filter, that of a smooth curve being 8; and the longest distance, s: a
 #: torque that depends on the motion changes within longer ones.
-SMOOTHED, LONGEST = 3.0, 0.04
+SMOOTHED, LONGEST = 2.0, 0.04
 #: Samples in which steps of a torque are looked for, and how many of them there are at least for
 #: every value of a torque in coarse steps.
 LOOKED_AT, RECUR = 20_000, 10

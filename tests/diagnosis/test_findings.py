@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose, notes
 from skidyn.diagnosis._findings import effect_curves
 from skidyn.effects import Term
@@ -50,10 +51,12 @@ def test_an_unknown_torque_is_drawn_over_a_signal_on_which_it_depends(missing):
     np.testing.assert_allclose(drawn["dq1",]["effect"], drawn["dq1",]["x"])
 
 
-def test_the_known_effect_that_comes_closest_to_an_unknown_torque(complete_log):
-    q = complete_log.X["q2"].to_numpy()
+def test_the_known_effect_that_comes_closest_to_an_unknown_torque():
+    log = make_hidden_effect_log(
+        load_planar_arm(), None, n_trajectories=6, duration=6.0, random_state=1
+    )
+    q = log.X["q2"].to_numpy()
     bump = 1.5 * q + np.exp(-(((q - 0.3) / 0.1) ** 2))
-    log = complete_log
     torque = log.y + np.column_stack([0 * q, bump])
 
     diagnosis = diagnose(RBDRegressor(log.robot), log.X, torque)

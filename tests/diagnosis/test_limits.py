@@ -25,7 +25,7 @@ def limits_of(log, X=None, effects=None):
 @pytest.fixture(scope="module")
 def log():
     return make_hidden_effect_log(
-        load_planar_arm(), None, noise="high", n_trajectories=6, duration=6.0, random_state=2
+        load_planar_arm(), None, noise="high", n_trajectories=6, duration=6.0, random_state=3
     )
 
 

@@ -214,7 +214,6 @@ def test_intervals_cover_the_truth(exact):
         ({"effects": "viscous"}, r"effects=\['viscous'\]"),
         ({"effects": None}, "expected a list"),
         ({"effects": [3]}, "3 is not an effect"),
-        ({"effects": [("viscous", 1)]}, "joints counted from 1"),
         ({"effects": [("viscous", ["a"])]}, "joints counted from 1"),
         ({"effects": [("viscous", [0])]}, "no joint 0; the robot has joints 1 to"),
         ({"robot": 5}, "5 describes no robot"),

@@ -3,6 +3,7 @@
 
 import pytest
 
+from skidyn.datasets import make_hidden_effect_log
 from skidyn.logs import read_log
 
 
@@ -19,9 +20,8 @@ def motors(frame, share, sign):
     ],
 )
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_sum_and_difference_are_named_and_undone(
-    share, sign, option, short, only, told_of, arm, tmp_path
-):
+def test_sum_and_difference_are_named_and_undone(share, sign, option, only, told_of, arm, tmp_path):
+    short = make_hidden_effect_log(arm, None, n_trajectories=4, duration=4.0, random_state=6).frame
     log = motors(short, share, sign)
     told = told_of(log)
     only(told.values(), "differential", "suspected", option)

@@ -43,6 +43,6 @@ def test_a_single_factor_is_the_round_number_near_by(log):
 
 def test_a_payload_of_some_recordings_does_not_change_relative_scales():
     arm = load_planar_arm()
-    log = make_hidden_effect_log(arm, "payload", n_trajectories=4, duration=4.0, random_state=4)
+    log = make_hidden_effect_log(arm, "payload", n_trajectories=6, duration=8.0, random_state=8)
     found = remedied(log, {1: 20.0, 2: 35.0})
     assert found[1] / 20 == pytest.approx(found[2] / 35, rel=0.02)

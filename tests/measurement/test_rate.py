@@ -26,12 +26,16 @@ def test_a_rate_that_is_wrong_in_clock_and_velocities(factor, told_of):
     assert float(words["dq"]) == pytest.approx(factor, rel=0.1)
 
 
-@pytest.mark.parametrize("factor", [0.5, 2.0])
-def test_a_rate_that_leaves_the_scale_of_every_torque(factor):
+@pytest.mark.parametrize(
+    ("factor", "log"),
+    [
+        (0.5, {"n_trajectories": 6, "duration": 8.0, "random_state": 8}),
+        (2.0, {"n_trajectories": 5, "duration": 6.0, "random_state": 7319358}),
+    ],
+)
+def test_a_rate_that_leaves_the_scale_of_every_torque(factor, log):
     robot = load_planar_arm()
-    frame = make_hidden_effect_log(
-        robot, None, n_trajectories=5, duration=6.0, random_state=7319358
-    ).frame
+    frame = make_hidden_effect_log(robot, None, **log).frame
     speeds = {n: frame[n] / factor for n in ("dq1", "dq2")}
     frame = frame.assign(time=frame["time"] * factor, **speeds)
     (told,) = [s for s in check_log(frame, robot).checks if s.certainty != "noted"]

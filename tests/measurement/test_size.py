@@ -6,8 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from skidyn.datasets import make_hidden_effect_log
 
-def test_a_larger_robot_is_no_gain_of_its_torques(short, arm, told_of):
+
+def test_a_larger_robot_is_no_gain_of_its_torques(arm, told_of):
+    log = make_hidden_effect_log(arm, None, n_trajectories=6, duration=8.0, random_state=3).frame
     size = 1.5
     powers = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2]) + 3
     larger = replace(
@@ -15,7 +18,7 @@ def test_a_larger_robot_is_no_gain_of_its_torques(short, arm, told_of):
         tree=replace(arm.tree, translations=size * arm.tree.translations),
         inertial_parameters=size**powers * np.asarray(arm.inertial_parameters),
     )
-    told = told_of(short, larger)["torque_scale"]
+    told = told_of(log, larger)["torque_scale"]
     assert told.suspicion == "the description is that of a robot of another size"
     words = told.evidence.split(" times its lengths")[0].split(" ")
     assert float(words[-1]) == pytest.approx(1 / size, rel=0.1)
