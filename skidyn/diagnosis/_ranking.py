@@ -52,8 +52,15 @@ Mask = NDArray[np.bool_]
 _Greedy = tuple[list[int], float]
 #: Number of kinds of which other forms are tried.
 FORMS_TRIED = 3
+#: Initial shapes of each further form that are refined.
+STARTS = 3
 #: Name of the group of products of signals, which are unknown functions.
 PRODUCTS = "products"
+
+
+def _is_near(one: float, other: float) -> bool:
+    """Whether neither of two scores is much above the other."""
+    return min(one, other) > NEARLY * max(one, other)
 
 
 class RankingSearch(RecordingSearch):
@@ -101,21 +108,39 @@ class RankingSearch(RecordingSearch):
 
         It is not if it is correlated, or if an unknown function of the same joints explains more.
         On the grid, the form with the best screening score need not be the one that fits best.
-        Forms of a kind that explains nearly as much as the best one are tried as well.
+        Forms of a kind that explains nearly as much as another one are tried as well, also if it
+        does so in another form.
         """
-        names = [h for h in ranking if h.kind != UNKNOWN and not within_recordings(h)]
-        names = sorted(names, key=lambda h: -h.score)[:FORMS_TRIED]
-        found: list[list[Candidate]] = []
-        for h in names:
-            if h.torque is not None or not get_effect(h.kind).forms:
-                continue
-            near = h is not names[0] and h.score > NEARLY * names[0].score
-            best = max((u.score for u in ranking if self._nameless_there(u, h)), default=0.0)
-            inexact = best > h.score + self.settings.least_gain
-            rough = get_effect(h.kind).is_slow  # the plain formula is an approximation
-            if near or inexact or rough or self._price(h.candidates) > self.settings.white:
-                found += self._in_other_forms(h)
-        return self._finals(found, refined=len(found))
+        found: list[Hypothesis] = []
+        tried: set[tuple[str, tuple[int, ...]]] = set()
+        while True:
+            names = [
+                h for h in (*ranking, *found) if h.kind != UNKNOWN and not within_recordings(h)
+            ]
+            best = {(h.kind, h.joints): h for h in sorted(names, key=lambda h: h.score)}
+            first = sorted(best.values(), key=lambda h: -h.score)[:FORMS_TRIED]
+            new = [
+                h
+                for h in first
+                if (h.kind, h.joints) not in tried and self._is_rough(h, first, ranking)
+            ]
+            if not new:
+                return found
+            tried |= {(h.kind, h.joints) for h in new}
+            forms = [form for h in new for form in self._in_other_forms(h)]
+            found += self._finals(forms, refined=len(forms))
+
+    def _is_rough(
+        self, own: Hypothesis, others: Sequence[Hypothesis], ranking: Sequence[Hypothesis]
+    ) -> bool:
+        """Whether another form of an explanation may matter."""
+        if own.torque is not None or not get_effect(own.kind).forms:
+            return False
+        near = any(h.kind != own.kind and _is_near(h.score, own.score) for h in others)
+        best = max((u.score for u in ranking if self._nameless_there(u, own)), default=0.0)
+        inexact = best > own.score + self.settings.least_gain
+        rough = get_effect(own.kind).is_slow  # the plain formula is an approximation
+        return near or inexact or rough or self._price(own.candidates) > self.settings.white
 
     @staticmethod
     def _nameless_there(function: Hypothesis, named: Hypothesis) -> bool:
@@ -127,19 +152,25 @@ class RankingSearch(RecordingSearch):
         )
 
     def _in_other_forms(self, hypothesis: Hypothesis) -> list[list[Candidate]]:
-        """The terms of a hypothesis in each other form of its kind."""
+        """The terms of a hypothesis in each other form of its kind, with several initial shapes.
+
+        That which removes most before its shape is refined may lead to a worse one.
+        """
         names = get_effect(hypothesis.kind).form_names
         sites = {c.joints: names & set(c.term.shape) for c in hypothesis.candidates}
-        strongest = self.strongest(
-            lambda c: (names & set(c.term.shape), c.joints),
-            lambda c: c.kind == hypothesis.kind and c.joints in sites,
-        )
-        return [
-            [strongest[form, joints] for joints in sites]
-            for form in dict.fromkeys(form for form, _ in strongest)
-            if all((form, joints) in strongest for joints in sites)
-            and any(form != own for own in sites.values())
-        ]
+        starts: dict[tuple[frozenset[str], tuple[int, ...]], list[int]] = {}
+        for i in np.argsort(-self.drops, kind="stable").tolist():
+            c = self.ranked[i]
+            if c.kind == hypothesis.kind and c.joints in sites:
+                starts.setdefault((frozenset(names & set(c.term.shape)), c.joints), []).append(i)
+        found = []
+        for form in dict.fromkeys(form for form, _ in starts):
+            own = [starts.get((form, joints), []) for joints in sites]
+            if any(form != other for other in sites.values()):
+                found += [[self.ranked[i] for i in some] for some in zip(*own, strict=False)][
+                    :STARTS
+                ]
+        return found
 
     def strongest(
         self, group: Callable[[Candidate], Any], wanted: Callable[[Candidate], bool]
