@@ -52,8 +52,9 @@ Mask = NDArray[np.bool_]
 _Greedy = tuple[list[int], float]
 #: Number of kinds of which other forms are tried.
 FORMS_TRIED = 3
-#: Initial shapes of each further form that are refined.
-STARTS = 3
+#: Initial shapes of each further form that are refined, at most, and what such a shape removes at
+#: least, as a share of what the first one does.
+STARTS, START_SHARE = 3, 0.5
 #: Name of the group of products of signals, which are unknown functions.
 PRODUCTS = "products"
 
@@ -161,16 +162,17 @@ class RankingSearch(RecordingSearch):
         starts: dict[tuple[frozenset[str], tuple[int, ...]], list[int]] = {}
         for i in np.argsort(-self.drops, kind="stable").tolist():
             c = self.ranked[i]
-            if c.kind == hypothesis.kind and c.joints in sites:
-                starts.setdefault((frozenset(names & set(c.term.shape)), c.joints), []).append(i)
-        found = []
+            if c.kind != hypothesis.kind or c.joints not in sites:
+                continue
+            own = starts.setdefault((frozenset(names & set(c.term.shape)), c.joints), [])
+            if not own or (len(own) < STARTS and self.drops[i] > START_SHARE * self.drops[own[0]]):
+                own.append(i)
+        forms: list[list[Candidate]] = []
         for form in dict.fromkeys(form for form, _ in starts):
-            own = [starts.get((form, joints), []) for joints in sites]
             if any(form != other for other in sites.values()):
-                found += [[self.ranked[i] for i in some] for some in zip(*own, strict=False)][
-                    :STARTS
-                ]
-        return found
+                places = zip(*(starts.get((form, joints), []) for joints in sites), strict=False)
+                forms += [[self.ranked[i] for i in some] for some in places]
+        return forms
 
     def strongest(
         self, group: Callable[[Candidate], Any], wanted: Callable[[Candidate], bool]
