@@ -53,6 +53,10 @@ def moves_by_steps(signals: Signals) -> bool:
 
     After repeated rows, positions change by all the missed motion.
     """
+    return bool(signals.once("moves by steps", lambda: _by_steps(signals)))
+
+
+def _by_steps(signals: Signals) -> bool:
     sizes = []
     for position in signals.q.T:
         changes, step = np.abs(np.diff(position)), position_step(position)

@@ -39,3 +39,8 @@ def motion_of(estimator: Any, X: Any) -> Any:
         return X
     kept = [name for name in X.columns if not TORQUE.fullmatch(str(name))]
     return X if len(kept) == len(names) else X[kept]
+
+
+def table_of(estimator: Any, X: Any, array: Any) -> Any:
+    """The motion as given if the columns of X have names, otherwise the validated array."""
+    return array if column_names(X) is None else motion_of(estimator, X)

@@ -15,21 +15,13 @@ import argparse
 import warnings
 from collections import Counter
 
-import numpy as np
 from joblib import Parallel, delayed
+from nothing_hidden import ROBOTS, rounded
 
-from skidyn.datasets import (
-    load_panda,
-    load_planar_arm,
-    load_scara,
-    load_srs_arm,
-    load_ur5,
-    make_hidden_effect_log,
-)
+from skidyn.datasets import make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
-ROBOTS = (load_planar_arm, load_ur5, load_scara, load_srs_arm, load_panda)
 KINDS = (
     "stribeck",
     "spring",
@@ -55,11 +47,7 @@ def answer(seed: int, bits: int) -> tuple[str, int, str]:
         rate=(100.0, 250.0, 500.0)[seed // 10 % 3],
         random_state=5000 + seed,
     )
-    X = log.X.copy()
-    for j, moves in enumerate(robot.joint_types):
-        step = 2 * np.pi / 2**bits * (0.1 if moves == "prismatic" else 1.0)
-        X[f"q{j + 1}"] = np.round(X[f"q{j + 1}"] / step) * step
-    found = diagnose(RBDRegressor(robot), X, log.y).findings
+    found = diagnose(RBDRegressor(robot), rounded(log, bits), log.y).findings
     kinds = [f.kind for f in found]
     told = "named" if kind in kinds else "unknown" if "unknown" in kinds else "another name"
     told = told if kinds else "missed"

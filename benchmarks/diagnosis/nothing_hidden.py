@@ -13,7 +13,9 @@ import argparse
 import warnings
 
 import numpy as np
+import pandas as pd
 from joblib import Parallel, delayed
+from sklearn.utils import Bunch
 
 from skidyn.datasets import (
     load_panda,
@@ -29,6 +31,15 @@ from skidyn.identification import RBDRegressor
 ROBOTS = (load_planar_arm, load_ur5, load_scara, load_srs_arm, load_panda)
 
 
+def rounded(log: Bunch, bits: int) -> pd.DataFrame:
+    """Motion with positions as encoders of so many bits show them; of sliders, a tenth per m."""
+    X = log.X.copy()
+    for j, kind in enumerate(log.robot.joint_types):
+        step = 2 * np.pi / 2**bits * (0.1 if kind == "prismatic" else 1.0)
+        X[f"q{j + 1}"] = np.round(X[f"q{j + 1}"] / step) * step
+    return X
+
+
 def alarm(seed: int, bits: int | None = None) -> list[str]:
     """Sentences of what was found where nothing is."""
     warnings.simplefilter("ignore")
@@ -36,10 +47,7 @@ def alarm(seed: int, bits: int | None = None) -> list[str]:
     noise = ("low", "high")[seed // len(ROBOTS) % 2]
     rate = (100.0, 250.0, 500.0)[seed // 10 % 3]  # the last two are looked at in short windows, too
     log = make_hidden_effect_log(robot, None, noise=noise, rate=rate, random_state=1000 + seed)
-    X = log.X.copy()
-    for j, kind in enumerate(robot.joint_types if bits else ()):
-        step = 2 * np.pi / 2**bits * (0.1 if kind == "prismatic" else 1.0)
-        X[f"q{j + 1}"] = np.round(X[f"q{j + 1}"] / step) * step
+    X = rounded(log, bits) if bits else log.X
     found = diagnose(RBDRegressor(robot), X, log.y).findings
     return [f"{robot.name}, {noise} noise, {rate:g} Hz, seed {seed}: {f.sentence}" for f in found]
 

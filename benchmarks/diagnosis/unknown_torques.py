@@ -17,19 +17,12 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
+from nothing_hidden import ROBOTS
 
-from skidyn.datasets import (
-    load_panda,
-    load_planar_arm,
-    load_scara,
-    load_srs_arm,
-    load_ur5,
-    make_hidden_effect_log,
-)
+from skidyn.datasets import make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
-ROBOTS = (load_planar_arm, load_ur5, load_scara, load_srs_arm, load_panda)
 #: Functions of signals in units of half of their range, m and n are random places in it. A known
 #: effect has none of these forms on the joints whose signals they take.
 FORMS: dict[str, Callable[..., np.ndarray]] = {

@@ -13,11 +13,10 @@ from sklearn.base import BaseEstimator, MetaEstimatorMixin, MultiOutputMixin, Re
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import _check_sample_weight, check_is_fitted
 
-from skidyn._columns import column_names
 from skidyn._exceptions import SkidynError
 from skidyn._keys import keys_of
 from skidyn._signals import Array
-from skidyn._validation import motion_of, validate_motion
+from skidyn._validation import table_of, validate_motion
 from skidyn.diagnosis._correction import is_physics, open_model, weights_of_fit
 from skidyn.diagnosis._diagnosis import diagnose
 from skidyn.diagnosis._faded import FadingCorrection, step_scores
@@ -308,7 +307,7 @@ class EffectSearchCV(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, BaseE
 
     def _table(self, X: Any, array: Array) -> Any:
         """The motion as given if the columns of X have names, else as an array."""
-        return array if column_names(X) is None else motion_of(self, X)
+        return table_of(self, X, array)
 
     def _log(self, X: Any, torque: Array, weight: Array | None) -> tuple[Any, Array, Array | None]:
         """The log that is searched."""

@@ -12,18 +12,16 @@ from numpy.typing import NDArray
 from skidyn._local_polynomial import local_polynomial
 from skidyn._repeated import stale_rows
 from skidyn._signals import Array, Signals
-from skidyn.evidence._cutoff import CUTOFF_SHARE, lowered_cutoff
+from skidyn.evidence._cutoff import (
+    HIGHEST_CUTOFF,
+    ORDER,
+    half_width,
+    lowered_cutoff,
+    usual_cutoff,
+)
 
-#: Order of the local polynomial. Of accelerations of 6 Hz sampled at 100 Hz, a quartic of the same
-#: noise loses 0.7 %, which looks like an elastic joint if the torque is precise; this order loses
-#: 0.1 %.
-ORDER = 6
-#: Highest cut-off, Hz.
-HIGHEST_CUTOFF = 27.0
 #: Relative spread of time steps above which positions are interpolated to an even grid first.
 EVEN_STEPS = 1e-3
-#: Largest half width of a window in samples.
-WIDEST = 250
 
 
 def smooth_motion(signals: Signals, cutoff: float | None = None) -> Signals:
@@ -68,14 +66,13 @@ def smooth_motion(signals: Signals, cutoff: float | None = None) -> Signals:
 
 def _chosen(signals: Signals, parts: Sequence[_Part], rate: float) -> Array:
     """Cut-off of every sample, Hz, chosen for each trajectory."""
-    highest = usual_cutoff(rate)
-    cutoffs = np.full(signals.n_samples, highest)
+    cutoffs = np.full(signals.n_samples, usual_cutoff(rate))
     of: dict[Any, list[_Part]] = {}
     for part in parts:
         of.setdefault(signals.trajectory[part.rows.start], []).append(part)
     for own in of.values():
         even = [part.even for part in own if part.rate == rate]
-        lowered = lowered_cutoff(even, rate, highest, ORDER, half_width, signals.unit)
+        lowered = lowered_cutoff(even, rate, signals.unit)
         for part in own:
             cutoffs[part.rows] = lowered
     return cutoffs
@@ -126,14 +123,3 @@ class _Part:
 
         inside = np.clip(self._time, self._grid[0], self._grid[-1])
         return [CubicSpline(self._grid, x)(inside) for x in smoothed]
-
-
-def usual_cutoff(rate: float) -> float:
-    """Cut-off in Hz for positions without much noise."""
-    return min(HIGHEST_CUTOFF, CUTOFF_SHARE * rate)
-
-
-def half_width(rate: float, cutoff: float) -> int:
-    """Half width of a Savitzky-Golay filter in samples (Schafer 2011, IEEE SPM 28)."""
-    half = ((ORDER + 1) / (2 * cutoff / rate) + 4.6) / 3.2
-    return int(np.clip(round(half), 4, WIDEST))

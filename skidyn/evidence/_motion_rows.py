@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals, blocks_held_out
 from skidyn.evidence._broken import without_broken
-from skidyn.evidence._kinematics import half_width, smooth_motion, usual_cutoff
+from skidyn.evidence._cutoff import half_width, usual_cutoff
+from skidyn.evidence._kinematics import smooth_motion
 from skidyn.evidence._rows import (
     FEWEST_SAMPLES,
     WINDOW,

@@ -19,7 +19,7 @@ from sklearn.utils.validation import (
     has_fit_parameter,
 )
 
-from skidyn._columns import ColumnSpec, column_names
+from skidyn._columns import ColumnSpec
 from skidyn._compat import (
     CallbackSupportMixin,
     FitProgress,
@@ -29,7 +29,7 @@ from skidyn._compat import (
     fit_progress,
 )
 from skidyn._keys import fitted_keys
-from skidyn._validation import motion_of, validate_motion
+from skidyn._validation import table_of, validate_motion
 from skidyn.hybrid._gate import learned_weights
 from skidyn.hybrid._own_joint import OwnJointRegressor
 from skidyn.hybrid._range import TrainingRange, distances, fade
@@ -178,7 +178,7 @@ class HybridRegressor(
         array, torque = validate_motion(
             self, X, y, multi_output=True, y_numeric=True, dtype=np.float64
         )
-        table = self._table(X, array)
+        table = table_of(self, X, array)
         self._one_dimensional = torque.ndim == 1
         weight = None
         if sample_weight is not None:
@@ -272,7 +272,7 @@ class HybridRegressor(
         """
         check_is_fitted(self)
         array = validate_motion(self, X, reset=False, dtype=np.float64)
-        table = self._table(X, array)
+        table = table_of(self, X, array)
         physics = self.physics_.predict(fitted_keys(self).for_learner(table, self.physics_))
         return self._shaped(physics) + self._learned(table, array)
 
@@ -291,7 +291,7 @@ class HybridRegressor(
         """
         check_is_fitted(self)
         array = validate_motion(self, X, reset=False, dtype=np.float64)
-        return self._learned(self._table(X, array), array)
+        return self._learned(table_of(self, X, array), array)
 
     def _learned(self, table: Any, array: Array) -> Array:
         learned = np.zeros((len(array), len(self.learned_weight_)))
@@ -300,10 +300,6 @@ class HybridRegressor(
             learned += np.reshape(self.learner_.predict(own), learned.shape)
             learned *= self.learned_weight_ * fade(self._novelty(array))[:, None]
         return self._shaped(learned)
-
-    def _table(self, X: Any, array: Array) -> Any:
-        """The motion as given if X has column names, otherwise the checked array."""
-        return array if column_names(X) is None else motion_of(self, X)
 
     def _shaped(self, torque: Any) -> Array:
         shape = (-1,) if self._one_dimensional else (-1, len(self.learned_weight_))
