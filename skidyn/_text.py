@@ -141,10 +141,12 @@ def measure(name: str, value: object, unit: str = "") -> str:
 def counted(n: int, noun: str) -> str:
     """A number of things.
 
-    >>> counted(1, "joint"), counted(6, "joint")
-    ('1 joint', '6 joints')
+    >>> counted(1, "joint"), counted(6, "joint"), counted(1200, "trajectory")
+    ('1 joint', '6 joints', '1,200 trajectories')
     """
-    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+    if n == 1:
+        return f"1 {noun}"
+    return f"{n:,} {noun.removesuffix('y')}ies" if noun.endswith("y") else f"{n:,} {noun}s"
 
 
 def joints_of(n: int) -> str:

@@ -8,11 +8,10 @@ from typing import Any
 
 from skidyn._bundled import bundled
 from skidyn._optional import import_optional
-from skidyn._text import digits, inside, joints_told, listed, raised
+from skidyn._text import counted, digits, inside, joints_told, listed, raised
 from skidyn.effects import get_effect, list_effects
 from skidyn.report._glossary import meaning
 from skidyn.report._picture import Canvas, Summary, pictures
-from skidyn.report._words import counted
 
 #: In this order: each script uses what the ones before it define.
 SCRIPTS = ("static/common.js", "static/figures.js", "static/panels.js")

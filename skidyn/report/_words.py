@@ -10,15 +10,6 @@ from skidyn._text import inside, joints_told
 from skidyn.effects import get_effect, list_effects
 
 
-def counted(number: int, noun: str) -> str:
-    """A number with its noun, ``"1 joint"`` or ``"2 joints"``."""
-    if number == 1:
-        return f"1 {noun}"
-    return (
-        f"{number:,} {noun.removesuffix('y')}ies" if noun.endswith("y") else f"{number:,} {noun}s"
-    )
-
-
 def coefficient_told(column: str) -> str:
     """A coefficient in words: ``viscous.Fv[1]`` is ``Fv of viscous friction on joint 1``."""
     match = re.fullmatch(r"(\w+)\.(\w+)\[([\d, ]+)\]", column)

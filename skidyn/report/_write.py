@@ -7,9 +7,9 @@ import os
 from pathlib import Path
 from typing import Any
 
+from skidyn._text import counted
 from skidyn._writing import write_text
 from skidyn.report._page import render_page
-from skidyn.report._words import counted
 
 
 def render_html(summary: dict[str, Any]) -> str:
