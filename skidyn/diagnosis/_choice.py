@@ -74,7 +74,22 @@ class ChoosingSearch(RankingSearch):
                 if simpler and self._as_good(own, errors, part):
                     best = rival
         best = self._nearest_to_description(self._simplest_of_family(best, ranking), ranking)
-        return self._plain_friction_first(best, ranking)
+        return self._with_fewest_numbers(self._plain_friction_first(best, ranking), ranking)
+
+    def _with_fewest_numbers(self, best: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
+        """Of forms of one effect that the data cannot separate, the one with the fewest numbers."""
+        if best.kind == UNKNOWN or within_recordings(best):
+            return best
+        least = best.score - SEPARATES * self._price(best.candidates)
+        equal = [
+            h
+            for h in ranking
+            if (h.kind, h.joints) == (best.kind, best.joints)
+            and h.n_parameters < best.n_parameters
+            and h.score > least
+            and not within_recordings(h)
+        ]
+        return min(equal, key=lambda h: (h.n_parameters, -h.score), default=best)
 
     def _plain_friction_first(self, best: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
         """Plain friction that the model lacks, before what may only resemble it.

@@ -25,7 +25,7 @@ HIGHEST_CUTOFF, CUTOFF_SHARE = 27.0, 0.24
 #: Largest half width of a window in samples.
 WIDEST = 250
 #: Noise of accelerations, relative to these themselves, that is small.
-SMALL = 0.2
+SMALL = 0.1
 #: Ratio of neighbouring cut-offs that are compared, and the lowest of them, Hz.
 RATIO, LOWEST = 1.2, 4.0
 #: How far above the cut-off that predicts positions best the chosen one is: the smoother loses a
