@@ -16,16 +16,6 @@ def test_the_first_of_a_ranking_was_added_and_rivals_score_less(missing):
 
 
 @pytest.mark.slow
-def test_what_the_formula_of_a_spring_leaves_is_no_ripple(found_in):
-    """A counterweight on a four-bar linkage pulls by the slope of its height."""
-    log = make_hidden_effect_log(load_planar_arm(), None, noise="low", random_state=3)
-    x = log.X["q1"].to_numpy()
-    rocker = 0.39 * np.sin(x) + np.arcsin(0.45 * np.sin(1.17 + 1.6 * x))
-    torque = log.y + 12.0 * (rocker - rocker.mean())[:, None] * [1.0, 0.0]
-    assert "torque_ripple" not in found_in(log.robot, log.X, torque)
-
-
-@pytest.mark.slow
 def test_the_power_of_a_coupling_is_found(found_in):
     log = make_hidden_effect_log(load_planar_arm(), None, noise="low", random_state=3)
     speed = log.X["dq1"].to_numpy() + 0.8 * log.X["dq2"].to_numpy()
