@@ -10,7 +10,7 @@ from math import isfinite, log10
 #: Above this many times the noise the scale is logarithmic.
 LINEAR = 12.0
 #: Least distance of ticks as a share of the bar.
-APART = 0.16
+APART = 0.2
 #: Where a logarithmic scale begins.
 LOWEST = 0.5
 
