@@ -173,13 +173,15 @@ def _findings(both: Sequence[Diagnosis], names: Sequence[str]) -> list[dict[str,
     """
     rows: list[dict[str, Any]] = []
     for side, (diagnosis, name) in enumerate(zip(both, names, strict=True)):
-        for finding in diagnosis.findings:
+        for finding, card in zip(diagnosis.findings, diagnosis.story()["cards"], strict=True):
             parameters = parameter_rows(plain(finding.to_dict()))
             for joint in finding.joints:
                 row = _row(rows, finding, joint)
                 if name in row["in"]:
                     continue
                 row["in"].append(name)
+                row["uncertain"] &= card["guess"]
+                row["confidence"][side] = finding.confidence
                 row["titles"][side] = finding.title
                 row["error_drop"][side] = finding.error_drop
                 row["parameters"][side] = [p for p in parameters if p["joint"] in (joint, "–")]
@@ -196,7 +198,7 @@ def _row(rows: list[dict[str, Any]], finding: Finding, joint: int) -> dict[str, 
             return row
     rows.append(
         {"kinds": [finding.kind], "rivals": list(finding.rivals), "joint": joint, "in": [],
-         "titles": [None, None], "error_drop": [None, None], "parameters": [[], []]}
+         "uncertain": True, "confidence": [None, None], "titles": [None, None], "error_drop": [None, None], "parameters": [[], []]}
     )  # fmt: skip
     return rows[-1]
 
@@ -280,15 +282,18 @@ def _headline(report: dict[str, Any]) -> str:
         best = names[0] if mean > 1 else names[1]
         return f"“{best}” has the smaller error"
     if report["findings"]:
-        return "The same effects are missing in both"
+        certain = any(not row["uncertain"] for row in report["findings"])
+        return f"The same effects {'are' if certain else 'may be'} missing in both"
     return "No effect is missing in either"
 
 
 def _brief(rows: Sequence[dict[str, Any]]) -> str:
+    """Effects with their joints; those that are uncertain in both recordings last."""
     joints: dict[str, list[int]] = {}
-    for row in rows:
+    for row in sorted(rows, key=lambda row: row["uncertain"]):
         title = next(filter(None, row["titles"])).partition(", best described by ")[0]
-        joints.setdefault(inside(title), []).append(row["joint"])
+        name = f"{'possibly ' if row['uncertain'] else ''}{inside(title)}"
+        joints.setdefault(name, []).append(row["joint"])
     return listed([f"{title} on {joints_told(sorted(on))}" for title, on in joints.items()])
 
 

@@ -42,6 +42,18 @@ def test_rivals_are_one_finding(fakes):
     assert dahl["titles"] == ["Dahl friction", "LuGre friction"]
 
 
+def test_what_is_uncertain_in_both_is_only_possible(fakes):
+    first, second = two_logs(fakes)
+    first.findings = [replace(f, confidence=0.3) for f in first.findings]
+    second.findings = []
+    summary = summarize_comparison(first, second, names=("usual", "whole"))
+    assert "Only in “usual”: possibly Dahl friction" in summary["headline"]
+    second.findings = first.findings
+    summary = summarize_comparison(first, second)
+    assert "The same effects may be missing in both" in summary["headline"]
+    assert "Missing in both: possibly Dahl friction" in summary["sentence"]
+
+
 def test_names_and_joints_must_fit(fakes):
     first, second = two_models(fakes)
     with pytest.raises(SkidynError, match="two different names"):
