@@ -330,6 +330,8 @@ def _extrapolated(
     for k, (predicted, scale) in others.items():
         y, use = seen.fits.mean_torque(k)
         own = rows[use]
+        if not own.any():
+            continue  # at rest in this recording
         error = float(np.sqrt(np.mean((y[use][own] - predicted) ** 2)))
         common = float(np.sqrt(np.mean(seen.identified.residual[k][own] ** 2)))
         wrong.append(error > max(LARGER * scale, 2 * common))

@@ -145,6 +145,7 @@ def test_a_form_in_no_catalogue_is_unknown_and_its_signals_are_named(forms):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_a_joint_that_rests_in_some_trajectories_is_diagnosed_all_the_same():
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=8, duration=8.0)
     X = log.X.copy()
