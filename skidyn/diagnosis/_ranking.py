@@ -410,14 +410,14 @@ class RankingSearch(LineSearch):
         return [self._in_time(own) for own in found if not self._follows_one_joint(tester, own)]
 
     def _follows_one_joint(self, tester: Tester, own: Sequence[Candidate]) -> bool:
-        """Whether a load in intervals of many recordings explains the torque of one joint only.
+        """Whether a load in intervals of many recordings, or one, explains a single joint only.
 
         A force whose torque on several joints has the right ratios is a force; one that explains a
         single joint has enough coefficients to follow whatever is missing there.
         """
         timed = {name for c in own for name, *_ in c.term.spans}
         several = any(len(c.rows) > 1 for c in own)
-        if not several or len(timed) <= self.settings.most_recordings:
+        if not several or 1 < len(timed) <= self.settings.most_recordings:
             return False
         left = tester.beside([c.rows for c in own]).residual
         pairs = zip(tester.residual, left, strict=True)

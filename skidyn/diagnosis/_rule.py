@@ -152,8 +152,9 @@ CHANGE_INSTEAD = 0.5
 
 # Effects that begin or end within recordings (``_spans.py``); ``nothing_hidden.py``.
 #: Rounds in which coefficients and times are determined in turn, and least number of recordings in
-#: which an effect must act: a single one does not show that it returns or stays.
-SPAN_ROUNDS, LEAST_RECORDINGS = 8, 2
+#: which an effect must act, since a single one does not show that it returns or stays, unless it
+#: acts on so many joints, whose torques have the ratios of a load.
+SPAN_ROUNDS, LEAST_RECORDINGS, JOINTS_OF_LOAD = 8, 2, 3
 
 # Effects that change steadily (``_courses.py``); ``nothing_hidden.py``.
 #: Rounds in which coefficients and sizes at the ends are determined in turn.

@@ -20,7 +20,7 @@ from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._parts import PartScan, n_parts
 from skidyn.diagnosis._recordings import everywhere
-from skidyn.diagnosis._rule import LEAST_RECORDINGS, SPAN_ROUNDS
+from skidyn.diagnosis._rule import JOINTS_OF_LOAD, LEAST_RECORDINGS, SPAN_ROUNDS
 from skidyn.diagnosis._tester import Tester
 from skidyn.effects import get_effect
 from skidyn.evidence import Problem
@@ -73,6 +73,8 @@ def span_candidates(
             inside, removed = _alternated(tester, times, whole, start)
             if removed > drop:
                 best, drop = inside, removed
+        if best is not None and whole.term.effect.grows:
+            best, drop = _carried(tester, times, whole, best, drop)
         plain = max(0.0, 0.0 if part is None else part.drop)
         if best is None or drop - times.price(best) < plain + least:
             continue
@@ -148,14 +150,32 @@ class _Times:
         return 4.0 * len(self.spans(inside)[1]) * float(np.log(self.moments))
 
     def candidate(self, whole: Candidate, inside: NDArray[np.bool_]) -> Candidate | None:
-        """The effect at these times; None if it fills whole recordings."""
+        """The effect at these times; None if it fills whole recordings.
+
+        A load shows by its torques on several joints what it is, also in a single recording.
+        """
         recordings, spans = self.spans(inside)
-        if not spans or len(recordings) < LEAST_RECORDINGS:
+        least = 1 if len(whole.rows) >= JOINTS_OF_LOAD else LEAST_RECORDINGS
+        if not spans or len(recordings) < least:
             return None
         term = whole.term.with_shape(trajectories=recordings, spans=spans)
         tried = n_parts(len(self.names), len(recordings)) * self.moments
         rows = self.problem.term_rows(term)
         return replace(whole, term=term, rows=rows, n_parts=tried)
+
+
+def _carried(
+    tester: Tester, times: _Times, whole: Candidate, inside: NDArray[np.bool_], drop: float
+) -> tuple[NDArray[np.bool_], float]:
+    """The times of a load, or the others if its mass is negative in these.
+
+    The bodies identified from all rows contain part of it, so that both explain equally much.
+    """
+    coefficients, _ = tester.estimate(times.cut(whole.rows, inside))
+    if coefficients[0] >= 0:
+        return inside, drop
+    others, removed = _alternated(tester, times, whole, ~inside)
+    return (inside, drop) if others is None or removed < drop / 2 else (others, removed)
 
 
 def _alternated(

@@ -302,17 +302,18 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
         likely = 1.0 if finding.confidence is None else finding.confidence
         if likely < UNLIKELY:
             return False
+        moves = any(term.effect.moves_link for term in finding.terms)
         drop = max(f.error_drop for f in of_kind)
+        if drop > 0 and not (moves or finding.kind == UNKNOWN):
+            # of samples, of which most is noise, or of averaged rows
+            drop = max([drop, *(f.averaged_drop or 0.0 for f in of_kind)])
         if drop >= MUCH:
             if finding.kind != UNKNOWN:
                 likely = of_significant(likely, min(f.q_value or 0.0 for f in of_kind))
             equalled = bool(finding.rivals) and finding.margin < ABOVE
             likely *= (1 + finding.alike + equalled) * (1 + len(finding.elsewhere))
-        moves = any(term.effect.moves_link for term in finding.terms)
         little = LITTLE_OF_DERIVATIVES if moves or finding.kind == UNKNOWN else LITTLE
         little *= _share_of_samples(diagnosis.problem, finding.trajectories)
-        if drop > 0 and not (moves or finding.kind == UNKNOWN):
-            drop = max([drop, *(f.averaged_drop or 0.0 for f in of_kind)])
         if drop < little and (moves or likely < SURE_OF_LITTLE):
             return False
         return likely >= GUESS or finding.error_drop >= GUESS

@@ -18,6 +18,8 @@ from skidyn.effects._smooth import range_of, splines
 
 #: Distances since the last reversal, rad or tenths of m, over which a torque may fade.
 _WAYS = (0.01, 0.03, 0.1, 0.3)
+#: Times since the last reversal, s, over which a torque may fade.
+_SINCE = (0.1, 0.4, 1.6)
 #: Widths of play, as shares of the range of a position, and number of splines of the function.
 _PLAYS, _LAGGING = (0.03, 0.06, 0.1, 0.15, 0.22, 0.33, 0.5), 16
 #: Widths of stop operators, as shares of the range of a torque.
@@ -149,24 +151,6 @@ class FrictionSinceReversal(NamelessEffect):
         )
 
 
-class FunctionOfWaySinceReversal(NamelessEffect):
-    """A torque that fades or grows with the distance since the last reversal of the joint."""
-
-    is_of_one_number = True
-    kind = "function_of_way_since_reversal"
-    title = "Function of the distance since the last reversal"
-    formula = r"f(|q - q_\mathrm{turn}|)"
-    coefficients = unnamed_coefficients(2 * len(_WAYS))
-    depends_on = ("q_own", "dq_own")
-
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        strokes = strokes_of(signals, joint)
-        way = np.zeros(signals.n_samples)
-        way[strokes.rows] = strokes.way / signals.unit[joint]
-        fading = np.column_stack([np.exp(-way / w) for w in _WAYS])
-        return np.hstack([fading, fading * signals.sign[:, [joint]]])
-
-
 class _OfAnyJoint(NamelessEffect):
     """A torque that depends on the history of any joint, this one included."""
 
@@ -175,6 +159,51 @@ class _OfAnyJoint(NamelessEffect):
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         return [{"other": k} for k in range(signals.n_joints)]
+
+
+class FunctionOfWaySinceReversal(_OfAnyJoint):
+    """A torque that fades or grows with the distance since the last reversal of a joint."""
+
+    kind = "function_of_way_since_reversal"
+    title = "Function of the distance since the last reversal"
+    formula = r"f(|q_k - q_{k,\mathrm{turn}}|)"
+    coefficients = unnamed_coefficients(2 * len(_WAYS))
+    depends_on = ("q_other", "dq_other")
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        k = int(shape.get("other", joint))
+
+        def fading() -> Array:
+            strokes = strokes_of(signals, k)
+            way = np.zeros(signals.n_samples)
+            way[strokes.rows] = strokes.way / signals.unit[k]
+            columns = np.column_stack([np.exp(-way / w) for w in _WAYS])
+            return np.hstack([columns, columns * signals.sign[:, [k]]])
+
+        columns: Array = signals.once(("way since reversal", k), fading)
+        return columns
+
+
+class FunctionOfTimeSinceReversal(_OfAnyJoint):
+    """A torque that fades or grows with the time since the last reversal of a joint."""
+
+    kind = "function_of_time_since_reversal"
+    title = "Function of the time since the last reversal"
+    formula = r"f(t - t_{k,\mathrm{turn}})"
+    coefficients = unnamed_coefficients(2 * len(_SINCE))
+    depends_on = ("dq_other", "time")
+    needs = ("time",)
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        k = int(shape["other"])
+
+        def fading() -> Array:
+            since = _time_since_reversal(signals, k)
+            columns = np.column_stack([np.exp(-since / time) for time in _SINCE])
+            return np.hstack([columns, columns * signals.sign[:, [k]]])
+
+        columns: Array = signals.once(("time since reversal", k), fading)
+        return columns
 
 
 class FunctionOfLastReversal(_OfAnyJoint):
@@ -353,8 +382,8 @@ class FunctionOfLaggingVelocity(FunctionOfLaggingPosition):
     signal, plays = "dq", _PLAYS[2:5]
 
 
-class RelaxingSpring(NamelessEffect):
-    """A torque that depends on the position and relaxes at rest: rubber, hoses, grease [1]_.
+class RelaxingSpring(_OfAnyJoint):
+    """A torque that depends on a position and relaxes at rest: rubber, hoses, grease [1]_.
 
     References
     ----------
@@ -364,15 +393,19 @@ class RelaxingSpring(NamelessEffect):
 
     kind = "relaxing_spring"
     title = "Torque that relaxes"
-    formula = r"\sum_i k_i\,(q - q_i),\quad T_i\,\dot q_i = q - q_i"
+    formula = r"\sum_i k_i\,(q_k - q_i),\quad T_i\,\dot q_i = q_k - q_i"
     coefficients = unnamed_coefficients(len(_RELAXATION))
-    depends_on = ("q_own", "dq_own")
+    depends_on = ("q_other", "dq_other")
     needs = ("time",)
-    is_of_one_number = True
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        q = signals.q[:, joint]
-        return np.column_stack([q - _followed(q, signals, time) for time in _RELAXATION])
+        k = int(shape.get("other", joint))
+        q = signals.q[:, k]
+        columns: Array = signals.once(
+            ("relaxing", k),
+            lambda: np.column_stack([q - _followed(q, signals, time) for time in _RELAXATION]),
+        )
+        return columns
 
 
 def _followed(x: Array, signals: Signals, time_constant: float) -> Array:
@@ -393,6 +426,17 @@ def _followed(x: Array, signals: Signals, time_constant: float) -> Array:
     return y
 
 
+def _time_since_reversal(signals: Signals, joint: int) -> Array:
+    """Time in s since a joint turned round last; since the start before it has turned."""
+    since = np.array(signals.since_start)
+    strokes = strokes_of(signals, joint)
+    if len(strokes.rows):
+        first = np.flatnonzero(np.diff(strokes.stroke, prepend=-1))
+        moved, counts = signals.clock[strokes.rows], np.diff([*first, len(strokes.rows)])
+        since[strokes.rows] = moved - np.repeat(moved[first], counts)
+    return since
+
+
 def _last_reversal(signals: Signals, joint: int) -> Array:
     """Position at which a joint turned round last; that of the start before it has turned."""
     turned = np.array(signals.q[:, joint])
@@ -411,6 +455,7 @@ HISTORY: tuple[type[NamelessEffect], ...] = (
     OscillationSinceStart,
     FrictionSinceReversal,
     FunctionOfWaySinceReversal,
+    FunctionOfTimeSinceReversal,
     FunctionOfLastReversal,
     FrictionAfterMotion,
     TorqueOfRecentMotion,

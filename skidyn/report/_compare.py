@@ -198,7 +198,8 @@ def _row(rows: list[dict[str, Any]], finding: Finding, joint: int) -> dict[str, 
             return row
     rows.append(
         {"kinds": [finding.kind], "rivals": list(finding.rivals), "joint": joint, "in": [],
-         "uncertain": True, "confidence": [None, None], "titles": [None, None], "error_drop": [None, None], "parameters": [[], []]}
+         "uncertain": True, "confidence": [None, None], "titles": [None, None],
+         "error_drop": [None, None], "parameters": [[], []]}
     )  # fmt: skip
     return rows[-1]
 

@@ -4,11 +4,13 @@
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_planar_arm
+from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
 from skidyn.diagnosis._spans import span_candidates
 from skidyn.diagnosis._tester import Tester
-from skidyn.effects import make_terms
+from skidyn.effects import Signals, get_effect, make_terms
 from skidyn.evidence import make_problem
+from skidyn.identification import RBDRegressor
 
 ROBOT = load_planar_arm()
 KINDS = ("offset", "spring", "payload", "external_wrench")
@@ -72,3 +74,27 @@ def test_what_is_hooked_on_once_and_stays_is_found_with_its_moment(motion):
     assert (best.kind, best.joints, best.trajectories) == ("spring", (2,), (4, 5, 6, 7))
     ((run, start, end),) = best.spans
     assert (run, start, end) == (4, pytest.approx(43.0, abs=0.15), pytest.approx(46.0, abs=0.15))
+
+
+@pytest.mark.slow
+def test_a_part_that_is_gripped_in_one_recording_is_a_payload_with_its_times():
+    log = make_hidden_effect_log(load_ur5(), None, n_trajectories=6, duration=6.0, random_state=4)
+    q, dq, ddq = (log.X[[f"{s}{j}" for j in range(1, 7)]].to_numpy() for s in ("q", "dq", "ddq"))
+    time, run = log.X["time"].to_numpy(), log.X["trajectory"].to_numpy()
+    names = np.unique(run)
+    since = time - np.array([time[run == k].min() for k in names])[np.searchsorted(names, run)]
+    signals = Signals(q, dq, ddq, run, time=time, robot=log.robot)
+    part = get_effect("payload").torque_columns(signals, range(6))
+    gripped = (run == names[3]) & (since > 2.4)
+    torque = np.array(log.y)
+    for j, columns in part.items():
+        torque[:, j] += gripped * (columns[:, :4] @ [3.0, 0.0, 0.0, 0.15])
+
+    diagnosis = diagnose(RBDRegressor(log.robot, ("viscous", "coulomb")), log.X, torque)
+
+    (finding,) = diagnosis.findings
+    assert (finding.kind, finding.trajectories) == ("payload", (names[3],))
+    assert finding.parameters["mass"]["value"] == pytest.approx(3.0, rel=0.2)
+    ((_, first, last),) = finding.terms[0].spans
+    assert first == pytest.approx(time[gripped].min(), abs=0.3)
+    assert last == pytest.approx(time[gripped].max(), abs=0.3)

@@ -80,6 +80,34 @@ def test_what_remembers_a_reversal_keeps_its_torque_until_the_next_one(signals):
     assert changed.sum() >= 3
 
 
+@pytest.mark.parametrize(
+    ("kind", "names"),
+    [
+        ("function_of_way_since_reversal", ("q2", "dq2")),
+        ("function_of_time_since_reversal", ("dq2", "time")),
+        ("relaxing_spring", ("q2", "dq2")),
+    ],
+)
+def test_a_torque_may_remember_the_motion_of_any_joint(signals, kind, names):
+    effect = get_effect(kind)
+    assert [shape["other"] for shape in effect.grid(signals, (0,))] == [0, 1]
+    assert effect.variables(0, {"other": 1}) == names
+    of_other = effect.columns(signals, 0, other=1)
+    np.testing.assert_array_equal(of_other, effect.columns(signals, 1, other=1))
+    assert not np.allclose(of_other, effect.columns(signals, 0, other=0))
+
+
+def test_what_fades_after_a_reversal_begins_anew_at_the_next_one(signals):
+    columns = get_effect("function_of_time_since_reversal").columns(signals, 0, other=1)
+    slow = columns[:, 2]  # the slowest one, without the direction
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(signals.q[:, 1])))) + 1
+    inside = [i for i in turns if len(np.unique(signals.trajectory[i - 2 : i + 3])) == 1]
+    assert inside
+    for i in inside:
+        assert slow[i + 1] > slow[i - 1]
+        assert slow[i + 1] > 0.95
+
+
 def test_friction_after_motion_needs_both_motions(signals):
     effect = get_effect("friction_after_motion")
     assert effect.variables(0, {"other": 1}) == ("dq1", "dq2")
