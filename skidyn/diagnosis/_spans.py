@@ -97,6 +97,7 @@ class _Times:
         self.problem, self.names = problem, problem.rows.recordings
         rows = problem.rows
         self.time, self.of = np.concatenate(rows.time), np.concatenate(rows.trajectory)
+        self.clock, self.recording = problem.signals.clock, problem.signals.trajectory
         order = np.lexsort((self.time, self.of))
         borders = np.flatnonzero(np.diff(self.of[order])) + 1
         self.runs: list[NDArray[np.int64]] = np.split(order, borders)
@@ -141,8 +142,12 @@ class _Times:
             recordings.append(name)
             if not own.all():
                 half = 0.5 * self.problem.rows.hop
-                first, last = float(time[own].min()), float(time[own].max())
-                spans.append((name, first - half, last + half))
+                first, last = float(time[own].min()) - half, float(time[own].max()) + half
+                # rows do not reach the first and the last sample
+                clock = self.clock[self.recording == name]
+                first = float(clock.min()) if own[0] else first
+                last = float(clock.max()) if own[-1] else last
+                spans.append((name, first, last))
         return tuple(recordings), tuple(spans)
 
     def price(self, inside: NDArray[np.bool_]) -> float:
