@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidyn._progress import track
 from skidyn._signals import Array
 from skidyn._text import joints_told, listed
-from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._confidence import confidence, mostly_stays
 from skidyn.diagnosis._constancy import Change, changes
 from skidyn.diagnosis._correction import is_physics, refitted_errors
@@ -30,21 +28,17 @@ from skidyn.diagnosis._findings import (
     make_finding,
 )
 from skidyn.diagnosis._floor import predictable_share
-from skidyn.diagnosis._held_out import held_out_residual
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
-    Hypothesis,
     SearchResult,
     found_terms,
 )
 from skidyn.diagnosis._intervals import parameter_intervals
+from skidyn.diagnosis._judged import Judged, worth_their_terms
 from skidyn.diagnosis._limits import Limit
-from skidyn.diagnosis._noise import sensor_noise
 from skidyn.diagnosis._remainder import (
     Remainder,
     find_remainder,
-    position_noise,
-    root_mean_square,
     torque_range,
 )
 from skidyn.diagnosis._result import Diagnosis, Verdict
@@ -64,9 +58,6 @@ from skidyn.diagnosis._withdrawal import (
     drop_of,
     guess,
     slight,
-    to_withdraw,
-    unsupported,
-    useless,
     without,
 )
 from skidyn.effects import Term, get_effect
@@ -112,86 +103,20 @@ def conclude(
     """
     robot = problem.robot
     assert robot is not None
-    tried_last: list[Hypothesis] = []
-    while True:
-        comparisons, history, averages, residual, own_torque = _steps(
-            problem, result, torque, sliding
-        )
-        terms = [*problem.terms, *found_terms(problem, result.findings)]
-        fixed = parameter_intervals(problem, terms, result.fit.noise, shapes=False)
-        errors = [
-            [_mean_error(c), entry["rmse"], average]
-            for c, entry, average in zip(comparisons, history, averages, strict=True)
-        ]
-        noise = (
-            sensor_noise(problem.signals, residual, problem.measured),
-            position_noise(problem, result.fit),
-        )
-        needless = useless(problem, result, errors, noise, settings.least_drop)
-        if needless is not None and all(
-            h is not needless[0] for h in [*tried_last, result.findings[-1]]
-        ):
-            # Without a later finding it may increase the error that it reduces beside it.
-            tried_last.append(needless[0])
-            order = sorted(result.findings, key=lambda h: h is needless[0])
-            result = replace(result, findings=order)
-            continue
-        wrong = needless or to_withdraw(problem, result, fixed)
-        if wrong is None and withdrawn:
-            wrong = unsupported(problem, result, settings.level)
-        if wrong is None:
-            break
-        result, withdrawn = without(problem, result, *wrong), True
-    intervals = parameter_intervals(problem, terms, result.fit.noise)
-    shown, remarks = [entry["rmse"] for entry in history], list(notes)
+    judged = worth_their_terms(problem, result, torque, sliding, settings, withdrawn)
+    result = judged.result
+    shown, remarks = [entry["rmse"] for entry in judged.history], list(notes)
     if not is_physics(model):
         shown, remark = _refitted(problem, result, model, data, shown)
         remarks.append(remark)
-    unknowns = _unknowns(problem, result, terms)
-    unlisted = slight(problem, result.findings, intervals, history[-1]["rmse"])
-    remarks += unlisted.values()
-    findings = []
-    for i, hypothesis in enumerate(result.findings):
-        if i in unlisted:
-            continue
-        for candidate, chance in zip(hypothesis.candidates, hypothesis.chances, strict=True):
-            drop = drop_of(shown[i], shown[i + 1], tuple(candidate.rows))
-            joints = [j + 1 for j in candidate.joints]
-            own = [u for u in unknowns if hypothesis.kind == UNKNOWN and u.joint in joints]
-            q = false_discovery_rate(chance, hypothesis.tried)
-            averaged = drop_of(averages[i], averages[i + 1], tuple(candidate.rows))
-            finding = make_finding(
-                problem, hypothesis, candidate, q, drop, averaged, intervals, own
-            )
-            finding.when.extend(acting(problem, candidate.term, own_torque))
-            curves = effect_curves(problem, finding.terms, own_torque, residual, finding.variables)
-            finding.curves.extend(curves)
-            findings.append(finding)
+    unknowns = _unknowns(problem, result, judged.terms)
+    findings, unlisted = _listed(judged, shown, unknowns)
+    remarks += unlisted
     share = predictable_share(problem, result.fit.residual)
-    rmse = np.array(history[-1]["rmse"])
-    parts = find_remainder(problem, result.fit, noise, torque, rmse, share)
-    least = np.maximum(
-        EPISODE_LEAST_RANGE * torque_range(torque), EPISODE_LEAST_NOISE * parts.noise
-    )
-    smooth = away_from_reversals(problem, result.fit.residual, sliding)
-    # On a joint with a finding, large local residuals are errors of its imperfect formula.
-    taken = {j for h in result.findings for c in h.candidates for j in c.rows}
-    inexact = [t for t in problem.terms if not t.effect.is_exact]
-    taken.update(j for t in inexact for j in problem.term_rows(t))
-    share_held = np.array([np.inf if j in taken else EPISODE_LEAST_HELD for j in range(len(rmse))])
-    episodes, inside = find_episodes(problem, smooth, least, share_held)
-    if episodes:
-        real = not_of_positions(problem, result.fit, smooth, inside)
-        if not real.all():
-            share_held = np.where(real, share_held, np.inf)
-            episodes, inside = find_episodes(problem, smooth, least, share_held)
-    if episodes:
-        findings.append(_episodic(episodes, inside, result.fit.residual))
-        taken.update(j - 1 for e in episodes for j in e.joints)
-    free = [j for j in np.flatnonzero(parts.material).tolist() if j not in taken]
-    if wandering := find_wandering(problem, result.fit.residual, free):
-        findings.append(wandering_torque(wandering))
-    ends = np.array(history[0]["rmse"]), rmse
+    rmse = np.array(judged.history[-1]["rmse"])
+    parts = find_remainder(problem, result.fit, judged.noise, torque, rmse, share)
+    findings += _in_time(judged, parts, torque, sliding)
+    ends = np.array(judged.history[0]["rmse"]), rmse
     whole = problem.whole_trajectories
     changed = changes(problem, result)
     for i, finding in enumerate(findings):
@@ -202,9 +127,9 @@ def conclude(
         _verdict(findings, parts),
         robot.joint_names,
         findings,
-        comparisons[0],
-        comparisons[-1],
-        history,
+        judged.comparisons[0],
+        judged.comparisons[-1],
+        judged.history,
         parts.noise,
         _unexplained(findings, unknowns, parts, rmse),
         limits,
@@ -225,6 +150,67 @@ def conclude(
     # "Nothing is missing" would be wrong: something is, and this is the most likely name.
     only = len(result.findings) == 1 and other.verdict == "complete"
     return diagnosis if only and max(f.error_drop for f in findings) > MUCH else other
+
+
+def _listed(
+    judged: Judged, shown: Sequence[Any], unknowns: Sequence[UnknownTorque]
+) -> tuple[list[Finding], list[str]]:
+    """Findings, one for every term, and remarks on those that are too small to be listed."""
+    problem, result = judged.problem, judged.result
+    intervals = parameter_intervals(problem, judged.terms, result.fit.noise)
+    unlisted = slight(problem, result.findings, intervals, judged.history[-1]["rmse"])
+    findings = []
+    for i, hypothesis in enumerate(result.findings):
+        if i in unlisted:
+            continue
+        for candidate, chance in zip(hypothesis.candidates, hypothesis.chances, strict=True):
+            reached = tuple(candidate.rows)
+            drop = drop_of(shown[i], shown[i + 1], reached)
+            averaged = drop_of(judged.averages[i], judged.averages[i + 1], reached)
+            joints = [j + 1 for j in candidate.joints]
+            own = [u for u in unknowns if hypothesis.kind == UNKNOWN and u.joint in joints]
+            q = false_discovery_rate(chance, hypothesis.tried)
+            finding = make_finding(
+                problem, hypothesis, candidate, q, drop, averaged, intervals, own
+            )
+            finding.when.extend(acting(problem, candidate.term, judged.own_torque))
+            curves = effect_curves(
+                problem, finding.terms, judged.own_torque, judged.residual, finding.variables
+            )
+            finding.curves.extend(curves)
+            findings.append(finding)
+    return findings, list(unlisted.values())
+
+
+def _in_time(
+    judged: Judged, parts: Remainder, torque: Array, sliding: NDArray[np.bool_]
+) -> list[Finding]:
+    """Torques that come and go, and that change over time, where nothing else was found."""
+    problem, result = judged.problem, judged.result
+    findings = []
+    least = np.maximum(
+        EPISODE_LEAST_RANGE * torque_range(torque), EPISODE_LEAST_NOISE * parts.noise
+    )
+    smooth = away_from_reversals(problem, result.fit.residual, sliding)
+    # On a joint with a finding, large local residuals are errors of its imperfect formula.
+    taken = {j for h in result.findings for c in h.candidates for j in c.rows}
+    inexact = [t for t in problem.terms if not t.effect.is_exact]
+    taken.update(j for t in inexact for j in problem.term_rows(t))
+    held = [np.inf if j in taken else EPISODE_LEAST_HELD for j in range(problem.n_joints)]
+    share_held = np.array(held)
+    episodes, inside = find_episodes(problem, smooth, least, share_held)
+    if episodes:
+        real = not_of_positions(problem, result.fit, smooth, inside)
+        if not real.all():
+            share_held = np.where(real, share_held, np.inf)
+            episodes, inside = find_episodes(problem, smooth, least, share_held)
+    if episodes:
+        findings.append(_episodic(episodes, inside, result.fit.residual))
+        taken.update(j - 1 for e in episodes for j in e.joints)
+    free = [j for j in np.flatnonzero(parts.material).tolist() if j not in taken]
+    if wandering := find_wandering(problem, result.fit.residual, free):
+        findings.append(wandering_torque(wandering))
+    return findings
 
 
 def _refitted(
@@ -253,45 +239,6 @@ def _refitted(
     )
 
 
-def _steps(
-    problem: Problem, result: SearchResult, torque: Array, sliding: NDArray[np.bool_]
-) -> tuple[
-    list[Comparison],
-    list[dict[str, Any]],
-    list[list[float]],
-    Array,
-    dict[Term, dict[int, Array]],
-]:
-    """Comparison and errors of the given model and after each finding.
-
-    Also returns the errors of averaged rows, the held-out residual of the last model, and the
-    torque of its findings.
-    """
-    comparisons, history, averages = [], [], []
-    dry = [t for t in problem.terms if t.is_dry]
-    for k in track(range(len(result.findings) + 1), "Judging what was found"):
-        found = found_terms(problem, result.findings[:k])
-        keep = [*dry, *(found if k == len(result.findings) else ())]
-        residual, own = _held_out(problem, [*problem.terms, *found], result, keep)
-        comparison = _comparison(problem, torque, residual, sliding, [own[t] for t in dry])
-        last = result.findings[k - 1] if k else None
-        kind, joints = (last.kind, last.joints) if last else (None, ())
-        comparisons.append(comparison)
-        history.append(_entry(comparison, kind, joints))
-        averages.append(
-            [root_mean_square(problem.rows.average(r, j)) for j, r in enumerate(residual.T)]
-        )
-    # All terms at every sample would need most of the memory for a long log.
-    return comparisons, history, averages, residual, {t: own[t] for t in found}
-
-
-def _mean_error(comparison: Comparison) -> list[float]:
-    """Mean absolute error of every joint on the samples judged, N m or N."""
-    use = comparison.sliding if comparison.judged is None else comparison.judged
-    total = np.where(use, np.abs(comparison.residual), 0.0).sum(0)
-    return [float(x) for x in total / np.maximum(use.sum(0), 1)]
-
-
 def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> list[UnknownTorque]:
     """Results for the unknown terms, after subtraction of the ripple."""
     nameless = [
@@ -307,55 +254,6 @@ def _unknowns(problem: Problem, result: SearchResult, terms: Sequence[Term]) -> 
     rest = [t for t in terms if t not in lines]
     bare = replace_torque(problem, problem.torque - result.ripple)
     return describe_unknowns(bare, rest, nameless, result.fit.noise)
-
-
-def _held_out(
-    problem: Problem, terms: Sequence[Term], result: SearchResult, keep: Sequence[Term]
-) -> tuple[Array, dict[Term, dict[int, Array]]]:
-    """Held-out residual; the torque of a line that was found comes from every sample."""
-    torque = problem.torque
-    waves: dict[Term, dict[int, Array]] = {}
-    for hypothesis in result.findings:
-        line = hypothesis.torque
-        if line is None or hypothesis.candidates[0].term not in terms:
-            continue
-        torque = torque - line
-        places = [(c.term, c.term.places[0]) for c in hypothesis.candidates]
-        waves |= {term: {place: line[:, place]} for term, place in places}
-    rest = [t for t in terms if t not in waves]
-    bare = replace_torque(problem, torque) if waves else problem
-    residual, held = held_out_residual(bare, rest, result.fit.sigma, keep)
-    return residual, held | waves
-
-
-def _comparison(
-    problem: Problem,
-    torque: Array,
-    residual: Array,
-    sliding: NDArray[np.bool_],
-    dry: Sequence[dict[int, Array]],
-) -> Comparison:
-    assert problem.robot is not None
-    friction = None
-    if dry:
-        friction = np.zeros_like(torque)
-        for own in dry:
-            for j, part in own.items():
-                friction[:, j] += part
-    return Comparison(
-        problem.signals,
-        torque,
-        torque - residual,
-        sliding,
-        problem.robot.joint_names,
-        problem.rows.sliding,
-        friction,
-    )
-
-
-def _entry(comparison: Comparison, added: str | None, joints: Sequence[int]) -> dict[str, Any]:
-    rmse = [float(x) for x in comparison.rmse(judged=True)]
-    return {"added": added, "joints": [j + 1 for j in joints], "rmse": rmse}
 
 
 def _sure(

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from sklearn.base import clone
 from sklearn.utils.validation import _check_sample_weight
 from threadpoolctl import threadpool_limits
@@ -54,6 +56,8 @@ from skidyn.simulation import Controller
 #: Suspicions with which a wave in time may be due to the logger. Uneven steps that are only noted
 #: are those of the samples, or too small to matter.
 UNSTEADY = {"repeated_rows", "interpolated_rows", "clock_jitter"}
+#: What was found on long windows, the rows of the closer searches, and what was found in the end.
+Found = tuple[SearchResult, Problem, SearchResult]
 
 
 def diagnose(
@@ -167,20 +171,22 @@ def diagnose(
     with threadpool_limits(1), cores(n_jobs):
         opened = open_model(model, X, tau)
         diagnosis = _diagnose(
-            opened.model,
-            opened.X,
-            tau,
-            robot,
-            effects,
-            trajectory,
-            time,
-            rate,
-            smooth,
-            settings or Settings(),
-            force,
-            sample_weight,
-            servos,
-            checks,
+            _Question(
+                opened.model,
+                opened.X,
+                tau,
+                robot,
+                effects,
+                trajectory,
+                time,
+                rate,
+                smooth,
+                settings or Settings(),
+                force,
+                sample_weight,
+                servos,
+                checks,
+            )
         )
         if controller is not None:
             found = diagnosis.findings
@@ -192,129 +198,146 @@ def diagnose(
         return diagnosis
 
 
-def _diagnose(
-    model: Any,
-    X: Any,
-    tau: Any,
-    robot: Robot | None,
-    effects: Iterable[str] | None,
-    trajectory: ColumnSpec,
-    time: ColumnSpec,
-    rate: float | None,
-    smooth: bool,
-    settings: Settings,
-    force: bool,
-    sample_weight: Any,
-    servos: Servos | None,
-    known: Sequence[Suspicion] | None,
-) -> Diagnosis:
-    if isinstance(effects, str):
-        raise EffectError(f"effects={effects!r} is one word; write a list, effects=[{effects!r}]")
-    if not isinstance(settings, Settings):
-        raise ValueError(f"settings={settings!r}; expected Settings(...) or None")
-    if not isinstance(smooth, bool | np.bool_):
-        raise ValueError(f"smooth={smooth!r}; expected True or False")
-    stated = tau
-    robot = robot if robot is not None else getattr(model, "robot", None)
-    if robot is None:
-        raise ColumnError(
-            f"the model, a {type(model).__name__}, has no robot; pass robot=Robot.from_urdf(...)"
-        )
-    if not isinstance(robot, Robot):
-        robot = Robot.from_urdf(robot)
-    signals, torque = read_signals(
-        X,
-        tau,
-        robot,
-        trajectory=getattr(model, "trajectory", trajectory) if trajectory == "auto" else trajectory,
-        time=getattr(model, "time", time) if time == "auto" else time,
-        rate=rate,
-        to_derive=smooth,
-    )
-    refuse_shuffled("A diagnosis", signals.trajectory, signals.time)
-    weight = None
-    if sample_weight is not None:
-        weight = _check_sample_weight(
-            sample_weight, torque, dtype=np.float64, ensure_non_negative=True
-        )
-    wanted = searched_kinds() if effects is None else list(effects)
-    kinds, settings_tried = split_kinds(wanted, servos is not None)
-    identified = getattr(model, "parameters", "identified") == "identified"
-    if servos is not None and np.isfinite(servos.controller.checked(robot.n_joints).limit).all():
-        kinds = [kind for kind in kinds if kind != "saturation"]
+@dataclass(frozen=True)
+class _Question:
+    """What :func:`diagnose` is asked, with a model of one of the kinds that it knows."""
 
-    logged = signals  # with copied rows, which are left out below
+    model: Any
+    X: Any
+    tau: Any
+    robot: Any
+    effects: Iterable[str] | None
+    trajectory: ColumnSpec
+    time: ColumnSpec
+    rate: float | None
+    smooth: bool
+    settings: Settings
+    force: bool
+    sample_weight: Any
+    servos: Servos | None
+    checks: Sequence[Suspicion] | None
 
-    def measured() -> Measurement:
-        return Measurement(
-            logged,
-            torque,
+    def checked_robot(self) -> Robot:
+        """The robot, after invalid arguments were refused."""
+        if isinstance(self.effects, str):
+            word = self.effects
+            raise EffectError(f"effects={word!r} is one word; write a list, effects=[{word!r}]")
+        if not isinstance(self.settings, Settings):
+            raise ValueError(f"settings={self.settings!r}; expected Settings(...) or None")
+        if not isinstance(self.smooth, bool | np.bool_):
+            raise ValueError(f"smooth={self.smooth!r}; expected True or False")
+        robot = self.robot if self.robot is not None else getattr(self.model, "robot", None)
+        if robot is None:
+            raise ColumnError(
+                f"the model, a {type(self.model).__name__}, has no robot; pass "
+                "robot=Robot.from_urdf(...)"
+            )
+        return robot if isinstance(robot, Robot) else Robot.from_urdf(robot)
+
+    def kinds(self, robot: Robot) -> tuple[list[str], list[str]]:
+        """Effects that are tried, and settings of servos."""
+        wanted = searched_kinds() if self.effects is None else list(self.effects)
+        kinds, settings = split_kinds(wanted, self.servos is not None)
+        if self.servos is not None:
+            limit = self.servos.controller.checked(robot.n_joints).limit
+            if np.isfinite(limit).all():
+                kinds = [kind for kind in kinds if kind != "saturation"]
+        return kinds, settings
+
+
+class _Log:
+    """The log of a question: its signals, and what is made of them."""
+
+    def __init__(self, asked: _Question, robot: Robot) -> None:
+        model = asked.model
+        self.asked, self.robot, self.tau = asked, robot, asked.tau
+        self.signals, self.torque = read_signals(
+            asked.X,
+            asked.tau,
             robot,
-            robot.joint_names,
-            identified=identified,
-            of_servos=servos is not None,
+            trajectory=_key_of(model, "trajectory", asked.trajectory),
+            time=_key_of(model, "time", asked.time),
+            rate=asked.rate,
+            to_derive=asked.smooth,
+        )
+        refuse_shuffled("A diagnosis", self.signals.trajectory, self.signals.time)
+        self.weight = None
+        if asked.sample_weight is not None:
+            self.weight = _check_sample_weight(
+                asked.sample_weight, self.torque, dtype=np.float64, ensure_non_negative=True
+            )
+        self.identified = getattr(model, "parameters", "identified") == "identified"
+
+    def measured(self) -> Measurement:
+        """All rows, as logged."""
+        return Measurement(
+            self.signals,
+            self.torque,
+            self.robot,
+            self.robot.joint_names,
+            identified=self.identified,
+            of_servos=self.asked.servos is not None,
         )
 
-    # first, since all other effects and checks are judged by the torque that they determine
-    of_servos = [] if servos is None else settings_found(measured(), servos, settings_tried)
-    if servos is not None and of_servos:
-        tau = torque = servos.with_findings(of_servos, robot.n_joints).torque
-        # what is left of a setting that is known within an error would have their name
-        alike = {rival for f in of_servos for rival in get_effect(f.kind).rivals}
-        kinds = [kind for kind in kinds if kind not in alike]
-    once = ~copied_rows(signals, torque)
-    judged, kept_weight = torque, weight
-    if not once.all():
-        signals, judged = signals.take(once), torque[once]
-        kept_weight = None if weight is None else weight[once]
-
-    def checked() -> list[Suspicion]:
-        checks = check_measurement(measured()) if known is None else list(known)
+    def checks(self) -> list[Suspicion]:
+        """What the checks suspect; an error of the log that is certain is refused."""
+        known, force = self.asked.checks, self.asked.force
+        checks = check_measurement(self.measured()) if known is None else list(known)
         if not force:
             refuse_certain(checks)
         return checks
 
-    def posed() -> Problem:
-        if not is_physics(model):
-            left = (torque - _prediction(model, X, torque))[once]
-            return _residual_problem(signals, left, robot, smooth, settings, kept_weight)
+    @cached_property
+    def once(self) -> NDArray[np.bool_]:
+        """Rows that are no copies of others."""
+        return ~copied_rows(self.signals, self.torque)
+
+    def problem(self) -> Problem:
+        """Rows and folds on which effects are judged."""
+        asked, once = self.asked, self.once
+        signals, torque, weight = self.signals, self.torque, self.weight
+        if not once.all():
+            signals, torque = signals.take(once), torque[once]
+            weight = None if weight is None else weight[once]
+        if not is_physics(asked.model):
+            left = (self.torque - _prediction(asked.model, asked.X, self.torque))[once]
+            return _residual_problem(
+                signals, left, self.robot, asked.smooth, asked.settings, weight
+            )
         return make_problem(
             signals,
-            judged,
-            robot=robot,
-            rigid_body=identified,
-            terms=own_terms(model, robot, X, tau),
-            smooth=smooth,
-            weight=kept_weight,
+            torque,
+            robot=self.robot,
+            rigid_body=self.identified,
+            terms=own_terms(asked.model, self.robot, asked.X, self.tau),
+            smooth=asked.smooth,
+            weight=weight,
         )
 
-    with aside(checked) as told:
-        try:
-            problem = posed()
-            _check_rows(problem)
-            if not torque.any():  # with force: otherwise the checks refuse it
-                raise LogError(
-                    "every torque is zero, so that no effect has a size: the torque was not "
-                    "recorded. Record it, or name the columns that hold it"
-                )
-            # while the checks run on another core: they rarely change the search
-            found = None if alone() else _search(problem, kinds, settings)
-        except Exception as error:
-            try:
-                told()
-            except SkidynError:
-                raise  # an error in the log is more informative
-            except Exception as other:
-                raise error from other  # the checks failed for the same reason
-            raise
-        checks = told()
+
+def _key_of(model: Any, name: str, stated: ColumnSpec) -> ColumnSpec:
+    """A key column as stated, or that of the model."""
+    return getattr(model, name, stated) if stated == "auto" else stated
+
+
+def _diagnose(asked: _Question) -> Diagnosis:
+    robot = asked.checked_robot()
+    log = _Log(asked, robot)
+    kinds, settings_tried = asked.kinds(robot)
+    # first, since all other effects and checks are judged by the torque that they determine
+    servos, of_servos = asked.servos, []
+    if servos is not None:
+        of_servos = settings_found(log.measured(), servos, settings_tried)
+    if servos is not None and of_servos:
+        log.tau = log.torque = servos.with_findings(of_servos, robot.n_joints).torque
+        # what is left of a setting that is known within an error would have their name
+        alike = {rival for f in of_servos for rival in get_effect(f.kind).rivals}
+        kinds = [kind for kind in kinds if kind not in alike]
+    checks, problem, found = _checked_and_searched(log, kinds)
     notes = [str(check) for check in checks]
-    doubts = [] if force else names_in_doubt(checks)
+    doubts = [] if asked.force else names_in_doubt(checks)
     if doubts and of_servos:  # what is doubtful may have looked like another servo
-        return _diagnose(
-            model, X, stated, robot, kinds, trajectory, time, rate, smooth, settings, force,
-            sample_weight, servos, known,
-        )  # fmt: skip
+        return _diagnose(replace(asked, robot=robot, effects=kinds))
     if doubts:
         kinds, found = [], None
         notes.append(
@@ -326,28 +349,73 @@ def _diagnose(
         warnings.warn(note, LogWarning, stacklevel=4)
     noted = {c.check for c in checks if c.certainty == "noted"} & {"clock_jitter"}
     steady = not {c.check for c in checks} & UNSTEADY - noted
+    settings = asked.settings
     if found is None or not steady:
         if not alone():
-            problem = posed()  # without data of the previous search
+            problem = log.problem()  # without data of the previous search
         found = _search(problem, kinds, settings, vibration=steady)
-    problem, (result, wider, completed), left_out = look_after_beginnings(
+    problem, found, left_out = look_after_beginnings(
         problem, found, kinds, lambda later: _search(later, kinds, settings, vibration=steady)
     )
     notes += [left_out] if left_out else []
-    limits = _limits(problem, result, completed, settings)
-    give_back()
-    sliding = problem.rows.sliding
-    data = (X, tau) if weight is None else (X, tau, weight)
-    diagnosis = conclude(wider, completed, limits, sliding, judged, notes, settings, model, data)
+    diagnosis = _concluded(log, problem, found, notes)
     diagnosis.checks = checks
     diagnosis.findings = [_beside_doubts(f, checks) for f in diagnosis.findings]
+    diagnosis.findings[:0] = of_servos
+    if of_servos and diagnosis.verdict == "complete":
+        diagnosis.verdict = "missing"
+    return diagnosis
+
+
+def _checked_and_searched(
+    log: _Log, kinds: list[str]
+) -> tuple[list[Suspicion], Problem, Found | None]:
+    """What the checks suspect, the problem and, with several processes, what a search found.
+
+    The checks run on another core meanwhile: they rarely change the search.
+    """
+    with aside(log.checks) as told:
+        try:
+            problem = log.problem()
+            _check_rows(problem)
+            if not log.torque.any():  # with force: otherwise the checks refuse it
+                raise LogError(
+                    "every torque is zero, so that no effect has a size: the torque was not "
+                    "recorded. Record it, or name the columns that hold it"
+                )
+            found = None if alone() else _search(problem, kinds, log.asked.settings)
+        except Exception as error:
+            try:
+                told()
+            except SkidynError:
+                raise  # an error in the log is more informative
+            except Exception as other:
+                raise error from other  # the checks failed for the same reason
+            raise
+        return told(), problem, found
+
+
+def _concluded(log: _Log, problem: Problem, found: Found, notes: list[str]) -> Diagnosis:
+    """The diagnosis of what was found, with limits of what was not."""
+    asked, (result, wider, completed) = log.asked, found
+    limits = _limits(problem, result, completed, asked.settings)
+    give_back()
+    data = (asked.X, log.tau) if log.weight is None else (asked.X, log.tau, log.weight)
+    diagnosis = conclude(
+        wider,
+        completed,
+        limits,
+        problem.rows.sliding,
+        log.torque[log.once],
+        notes,
+        asked.settings,
+        asked.model,
+        data,
+    )
     kept = {c.site for h in diagnosis.result.findings for c in h.candidates}
     sought = [c for h in completed.findings for c in h.candidates]
     withdrawn = [c for c in sought if c.site not in kept]
     diagnosis.limits = without_withdrawn(diagnosis.limits, withdrawn)
-    diagnosis.findings[:0] = of_servos
-    if of_servos and diagnosis.verdict == "complete":
-        diagnosis.verdict = "missing"
     return diagnosis
 
 
@@ -363,7 +431,7 @@ def _beside_doubts(finding: Finding, checks: Sequence[Suspicion]) -> Finding:
 
 def _search(
     problem: Problem, kinds: list[str], settings: Settings, vibration: bool = True
-) -> tuple[SearchResult, Problem, SearchResult]:
+) -> Found:
     """Missing effects from long windows, then the rows and findings of the closer searches.
 
     If the clock is in doubt, there is no search for a ``vibration``, which may be due to the
