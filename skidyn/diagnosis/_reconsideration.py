@@ -116,10 +116,17 @@ class ReconsideringSearch(DuellingSearch):
         return best
 
     def _names_on(self, function: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The best few known effects of all recordings that may replace a function."""
+        """The best few known effects of all recordings that may replace a function.
+
+        Each kind once, in its best form.
+        """
         names = [h for h in ranking if h.kind != UNKNOWN and not within_recordings(h)]
         names = [h for h in names if set(function.joints) <= set(h.joints)]
-        return [h for h in names if not self.denied(h, function)][: self.settings.refined]
+        best: dict[str, Hypothesis] = {}
+        for h in names:
+            if not self.denied(h, function):
+                best.setdefault(h.kind, h)
+        return list(best.values())[: self.settings.refined]
 
     def reconsider(self, newest: Hypothesis) -> None:
         """Compare all kinds again for the part of earlier findings, in presence of the newest."""
