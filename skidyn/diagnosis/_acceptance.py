@@ -39,8 +39,16 @@ from skidyn.diagnosis._tester import Tester
 class JudgingSearch(ChoosingSearch):
     """A search that judges the explanations that it chose."""
 
-    def judged(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """The hypothesis with those of its terms that are significant in addition to the others."""
+    def judged(self, hypothesis: Hypothesis, beside: Sequence[Candidate] = ()) -> Hypothesis | None:
+        """The hypothesis with those of its terms that are significant in addition to the others.
+
+        Parameters
+        ----------
+        hypothesis : Hypothesis
+            Known effect or unknown function.
+        beside : sequence of Candidate, optional
+            Terms in addition to those of the model.
+        """
         if hypothesis.torque is not None:  # judged on single samples, by its line
             chance = hypothesis.chances[0]
             tried = self.tried()
@@ -50,7 +58,7 @@ class JudgingSearch(ChoosingSearch):
             return self._judged_together(hypothesis)
         while candidates:
             chances = [
-                self.chance(c, [*self.chosen, *(o for o in candidates if o is not c)])
+                self.chance(c, [*self.chosen, *beside, *(o for o in candidates if o is not c)])
                 for c in candidates
             ]
             worst = int(np.argmax(chances))

@@ -20,6 +20,7 @@ from skidyn.diagnosis._hypothesis import (
     on_single_joints,
     ranked_with,
     rivals_among,
+    some_recordings,
     uses_the_fit,
     within_recordings,
 )
@@ -45,9 +46,9 @@ class ReconsideringSearch(DuellingSearch):
             forces = [j for j in best.joints if self.of_one_position(best, j)]
             if traced & (set(best.joints) - set(forces)):
                 continue  # another, weaker trace of the same force
-            best = self._first_of_two_names(best, offered)
+            best, beside = self._first_of_two_names(best, offered)
             simpler = self._at_its_limit(best)
-            judged = None if simpler is None else self.judged(simpler)
+            judged = None if simpler is None else self.judged(simpler, beside)
             if judged is not None and self.due_to_positions(judged):
                 judged = None
             if judged is not None:
@@ -87,8 +88,14 @@ class ReconsideringSearch(DuellingSearch):
             candidates.append(Candidate(kind, term, c.rows))
         return replace(step, kind=kind, candidates=tuple(candidates))
 
-    def _first_of_two_names(self, best: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis:
-        """An unknown function, or the first of two known effects that together are as good."""
+    def _first_of_two_names(
+        self, best: Hypothesis, ranking: list[Hypothesis]
+    ) -> tuple[Hypothesis, Sequence[Candidate]]:
+        """An unknown function, or the first of two known effects that together are as good.
+
+        With the terms of the second one if each of the two hides the other: the error that one of
+        them leaves is too large for the other to be significant alone.
+        """
         if (
             best.kind != UNKNOWN
             or best.errors is None
@@ -97,23 +104,57 @@ class ReconsideringSearch(DuellingSearch):
             # one force over the position of a joint is simpler than two that add up to it
             or all(self.of_one_position(best, j) for j in best.joints)
         ):
-            return best
-        left = best.errors.sum(0)
-        removed = left * np.expm1(np.maximum(best.gain, 0) / self._counts)
+            return best, ()
         for rival in self._names_on(best, ranking):
             first = self.judged(rival)
-            if first is None:
-                continue
-            kept = self._state()
-            self.add(first)
-            self.refit()
-            self.sigma = self.weights()
-            second = [h for h in self._known_alone() if set(best.joints) <= set(h.joints)]
-            errors = [h.errors.sum(0) for h in second if h.errors is not None]
-            self._restore(kept)
-            if any(self._good_enough(e, left, removed, best.joints) for e in errors):
-                return rival
-        return best
+            if first is not None and self._second_name(first, best) is not None:
+                return rival, ()
+        for rival in self._hidden_names(best, ranking):
+            second = self._second_name(rival, best)
+            if second is not None and self.judged(rival, second.candidates) is not None:
+                return rival, second.candidates
+        return best, ()
+
+    def _second_name(self, first: Hypothesis, function: Hypothesis) -> Hypothesis | None:
+        """A known effect that together with a first one is as good as a function."""
+        assert function.errors is not None
+        left = function.errors.sum(0)
+        removed = left * np.expm1(np.maximum(function.gain, 0) / self._counts)
+        kept = self._state()
+        self.add(first)
+        self.refit()
+        self.sigma = self.weights()
+        found = [h for h in self._known_alone() if set(function.joints) <= set(h.joints)]
+        self._restore(kept)
+        for h in found:
+            if h.errors is not None and self._good_enough(
+                h.errors.sum(0), left, removed, function.joints
+            ):
+                return h
+        return None
+
+    def _hidden_names(
+        self, function: Hypothesis, ranking: Sequence[Hypothesis]
+    ) -> list[Hypothesis]:
+        """Known effects on the joint of a function of several signals, significant or not.
+
+        Those of the ranking that are significant have been tried.
+        """
+        if len(function.joints) > 1 or len(function.variables) < 2:
+            return []
+        tried = {h.kind for h in self._names_on(function, ranking) if self.judged(h) is not None}
+        strongest = self.strongest(
+            lambda c: c.kind,
+            lambda c: (
+                c.kind not in tried | {UNKNOWN}
+                and c.joints == function.joints
+                and not some_recordings(c)
+            ),
+        )
+        drops = {id(c): drop for c, drop in zip(self.ranked, self.drops.tolist(), strict=True)}
+        first = sorted(strongest.values(), key=lambda c: -drops[id(c)])
+        names = self._finals([[c] for c in first[: self.settings.refined]])
+        return [h for h in names if not self.denied(h, function)]
 
     def _names_on(self, function: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The best few known effects of all recordings that may replace a function.
