@@ -278,25 +278,7 @@ class ClockJitter(Check):
             )
         elif found.margin > TOLD:
             measurement.stale = True
-            gained = _gained_by_torque(measurement)
-            harmful = found.spread > OFF * step if gained is None else gained > HARM
-            says = (
-                ""
-                if gained is None
-                else "; with them the log-likelihood of the fit of the torque changes by "
-                f"{round(gained):+d}"
-                + ("" if harmful else ", so that the influence of the stamps is small")
-            )
-            sure = harmful and found.margin > CERTAIN and found.ratio > 1.2
-            closer = found.ratio > CLOSER
-            yield self.suspicion(
-                "the time stamps jitter, but the samples were taken at even steps",
-                f"the stamps lie {size} around even steps of {1e3 * step:.4g} ms, and with even "
-                f"steps a position follows from its neighbours up to {found.ratio:.3g} times as "
-                f"closely{says}",
-                "certain" if sure else "suspected" if harmful or closer else "noted",
-                remedy=remedy_of("clock", "regular"),
-            )
+            yield self._jitters(measurement, found, size, step)
         elif measurement.jitter > 0.25:
             really = found.margin < -TOLD
             yield self.suspicion(
@@ -306,6 +288,30 @@ class ClockJitter(Check):
                 + ", and derivatives use the recorded times",
                 "noted",
             )
+
+    def _jitters(
+        self, measurement: Measurement, found: Jitter, size: str, step: float
+    ) -> Suspicion:
+        """Stamps off even steps, and whether they do harm."""
+        gained = _gained_by_torque(measurement)
+        harmful = found.spread > OFF * step if gained is None else gained > HARM
+        says = (
+            ""
+            if gained is None
+            else "; with them the log-likelihood of the fit of the torque changes by "
+            f"{round(gained):+d}"
+            + ("" if harmful else ", so that the influence of the stamps is small")
+        )
+        sure = harmful and found.margin > CERTAIN and found.ratio > 1.2
+        closer = found.ratio > CLOSER
+        return self.suspicion(
+            "the time stamps jitter, but the samples were taken at even steps",
+            f"the stamps lie {size} around even steps of {1e3 * step:.4g} ms, and with even "
+            f"steps a position follows from its neighbours up to {found.ratio:.3g} times as "
+            f"closely{says}",
+            "certain" if sure else "suspected" if harmful or closer else "noted",
+            remedy=remedy_of("clock", "regular"),
+        )
 
 
 def _gained_by_torque(measurement: Measurement) -> float | None:

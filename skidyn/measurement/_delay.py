@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -142,25 +142,78 @@ def find_delay(fits: Fits) -> Delay:
     )
 
 
+@dataclass(frozen=True)
+class Rest:
+    """What bodies, friction and rotor inertia leave of the torque of a joint, at every lag.
+
+    Attributes
+    ----------
+    joint : int
+        Joint, from 0.
+    rows : ndarray of shape (n_rows,) of bool
+        Rows that are used, of all.
+    torque, rest : ndarray of shape (n_used_rows, n_lags)
+        Torque, and its rest.
+    shared : ndarray of shape (n_used_rows, n_columns)
+        Orthonormal columns that all recordings have in common.
+    squares : ndarray of shape (GROUPS, n_lags)
+        Squares of the rest in every group of rows.
+    """
+
+    joint: int
+    rows: NDArray[np.bool_]
+    torque: Array
+    rest: Array
+    shared: Array
+    squares: Array
+
+
 def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
     """The best of some lags, and how many joints and recordings have the first or the last."""
-    n = fits.n_joints
-    beyond, middle = 0, len(lags_tried) // 2
-    own_errors, own_gains, halves = np.full(n, np.nan), np.zeros(n), np.full((n, 2), np.nan)
-    drifts = np.full(n, np.nan)
-    unknown = Delay(
-        np.nan, np.nan, np.full(n, np.nan), own_errors, 0.0, own_gains, halves, drifts=drifts
-    )
+    n, beyond, middle = fits.n_joints, 0, len(lags_tried) // 2
+    lags, own_errors, drifts = (np.full(n, np.nan) for _ in range(3))
+    own_gains, halves = np.zeros(n), np.full((n, 2), np.nan)
+    # of every joint: number of rows, and squares of all of them and of those in first halves
+    tables: list[tuple[int, Array, Array]] = []
+    costs: dict[int, list[Array]] = {}
+    counts: dict[int, int] = {}
+    first, speeds = _first_half(fits), np.abs(fits.average(Reading().motion(fits.signals).dq))
+    for one in _rests(fits, lags_tried):
+        j, total = one.joint, one.squares.sum(axis=0)
+        if int(np.argmin(total)) in (0, len(lags_tried) - 1):
+            beyond += 1
+            continue
+        run_of = fits.recording[one.rows]
+        for run, cost in _run_costs(one.shared, one.torque, run_of):
+            costs.setdefault(run, []).append(cost)
+            counts[run] = counts.get(run, 0) + int(np.sum(run_of == run))
+        halved = _squares(one.rest * first[one.rows][:, None])
+        tables.append((len(one.rest), one.squares, halved))
+        sooner = halved.sum(axis=0)
+        lags[j] = _lowest(total, lags_tried)
+        drifts[j] = _lowest(total - sooner, lags_tried) - _lowest(sooner, lags_tried)
+        own_errors[j] = _spread([_lowest(total - group, lags_tried) for group in one.squares])
+        speed = speeds[one.rows, j]
+        fast = speed > np.median(speed)
+        halves[j] = [
+            _lowest((one.rest[rows] ** 2).sum(axis=0), lags_tried) for rows in (~fast, fast)
+        ]
+        own_gains[j] = len(one.rest) / 2 * np.log(total[middle] / _least(total))
+    found = Delay(np.nan, np.nan, lags, own_errors, 0.0, own_gains, halves, drifts=drifts)
+    if not tables:
+        return found, beyond, 0
+    runs, runs_beyond = _of_runs(costs, counts, lags_tried)
+    return replace(_in_common(found, tables, lags_tried), runs=runs), beyond, runs_beyond
+
+
+def _rests(fits: Fits, lags_tried: Array) -> Iterator[Rest]:
+    """What is left of the torque of every joint that bodies explain at some lag."""
     s = Reading().motion(fits.signals)
     every = np.arange(10 * fits.robot.n_bodies)
     regressor = fits.mean_regressor(fits.robot, s, every)
     shifted = [fits.average(fits.torque_at(lag)) for lag in lags_tried]
-    tables, firsts, lags = [], [], np.full(n, np.nan)
-    squares: dict[int, list[Array]] = {}
-    counts: dict[int, int] = {}
-    run_of = fits.recording
-    first = _first_half(fits)
-    for j in range(n):
+    middle = len(lags_tried) // 2
+    for j in range(fits.n_joints):
         use = sliding(fits, s, j)
         if not fits.usable(j) or use.sum() < FEWEST:
             continue
@@ -169,7 +222,8 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
         further = fits.average(lines_between(s.q[:, j]))[use]
         y = np.stack([torque[use, j] for torque in shifted], axis=1)
         shared = basis = _basis(plain)
-        wider = _basis(np.column_stack([plain, further, by_recording(felt[:, LOAD], run_of[use])]))
+        loads = by_recording(felt[:, LOAD], fits.recording[use])
+        wider = _basis(np.column_stack([plain, further, loads]))
         if _needed(basis, wider, y):
             # a load of a recording would follow part of its own lag
             shared, basis = _basis(np.column_stack([plain, further])), wider
@@ -177,51 +231,42 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
             continue
         rest = y - basis @ (basis.T @ y)
         spread = float(np.sum((y[:, middle] - y[:, middle].mean()) ** 2))
-        errors = np.stack([(part**2).sum(axis=0) for part in np.array_split(rest, GROUPS)])
-        total = errors.sum(axis=0)
-        if spread <= 0 or total.min() > LEFT * spread:
+        squares = _squares(rest)
+        if spread <= 0 or squares.sum(axis=0).min() > LEFT * spread:
             continue
-        if int(np.argmin(total)) in (0, len(lags_tried) - 1):
-            beyond += 1
-            continue
-        tables.append((len(rest), errors))
-        for run, cost in _run_costs(shared, y, run_of[use]):
-            squares.setdefault(run, []).append(cost)
-            counts[run] = counts.get(run, 0) + int(np.sum(run_of[use] == run))
-        sooner = rest * first[use][:, None]
-        firsts.append(np.stack([(p**2).sum(axis=0) for p in np.array_split(sooner, GROUPS)]))
-        lags[j] = _lowest(total, lags_tried)
-        sooner_total = firsts[-1].sum(axis=0)
-        drifts[j] = _lowest(total - sooner_total, lags_tried) - _lowest(sooner_total, lags_tried)
-        own_errors[j] = _spread([_lowest(total - errors[g], lags_tried) for g in range(GROUPS)])
-        speed = np.abs(fits.average(s.dq[:, j])[use])
-        fast = speed > np.median(speed)
-        halves[j] = [_lowest((rest[rows] ** 2).sum(axis=0), lags_tried) for rows in (~fast, fast)]
-        own_gains[j] = len(rest) / 2 * np.log(total[middle] / _least(total))
-    if not tables:
-        return unknown, beyond, 0
+        yield Rest(j, use, y, rest, shared, squares)
 
+
+def _squares(rest: Array) -> Array:
+    """Sum of squares in every group of rows."""
+    return np.stack([(part**2).sum(axis=0) for part in np.array_split(rest, GROUPS)])
+
+
+def _in_common(
+    found: Delay, tables: Sequence[tuple[int, Array, Array]], lags_tried: Array
+) -> Delay:
+    """Lags of single joints with that of all of them, and with those of halves of recordings."""
     # squared errors, and not their logarithms, are a parabola of the lag
-    noise = [float(e.sum(axis=0).min()) / n for n, e in tables]
+    noise = [float(squares.sum(axis=0).min()) / n for n, squares, _ in tables]
 
-    def lag(parts: list[Array], left_out: int | None = None) -> float:
+    def lag(parts: Sequence[Array], left_out: int | None = None) -> float:
         keep = [g for g in range(GROUPS) if g != left_out]
         cost = [e[keep].sum(axis=0) / (2 * s) for s, e in zip(noise, parts, strict=True)]
         return _lowest(np.asarray(np.sum(cost, axis=0)), lags_tried)
 
-    whole_log = [errors for _, errors in tables]
-    seconds = [errors - sooner for errors, sooner in zip(whole_log, firsts, strict=True)]
-    common = lag(whole_log)
-    error = _spread([lag(whole_log, g) for g in range(GROUPS)])
-    drift = _spread([lag(seconds, g) - lag(firsts, g) for g in range(GROUPS)])
-    whole = sum(n / 2 * np.log(e.sum(axis=0)) for n, e in tables)
-    gain = float(whole[middle] - _least(whole))
-    early, late = lag(firsts), lag(seconds)
-    runs, runs_beyond = _of_runs(squares, counts, lags_tried)
-    found = Delay(
-        common, error, lags, own_errors, gain, own_gains, halves, early, late, drift, runs, drifts
+    whole = [squares for _, squares, _ in tables]
+    firsts = [sooner for *_, sooner in tables]
+    seconds = [squares - sooner for _, squares, sooner in tables]
+    likely = sum(n / 2 * np.log(squares.sum(axis=0)) for n, squares, _ in tables)
+    return replace(
+        found,
+        common=lag(whole),
+        error=_spread([lag(whole, g) for g in range(GROUPS)]),
+        gain=float(likely[len(lags_tried) // 2] - _least(likely)),
+        early=lag(firsts),
+        late=lag(seconds),
+        drift_error=_spread([lag(seconds, g) - lag(firsts, g) for g in range(GROUPS)]),
     )
-    return found, beyond, runs_beyond
 
 
 def _run_costs(

@@ -212,15 +212,6 @@ class LostRows(Check):
         anyhow = found.size > LARGE and found.disorder > FASTER
         if anyhow or (share > BACKWARDS and forwards > BACKWARDS):
             measurement.lost = measurement.shuffled = True
-            if _alternate(measurement):
-                yield self.suspicion(
-                    "every second row is of another source",
-                    "from row to row the joints move against their velocities or farther than "
-                    "these imply, but from every row to the next but one as they imply: two "
-                    "sources were written into one log; keep the rows of one of them",
-                    "certain",
-                )
-                return
             evidence = (
                 f"positions step by {100 * found.size:.0f} % of their spread from row to row, "
                 f"{found.disorder:.2g} times as far as their velocities imply"
@@ -228,9 +219,7 @@ class LostRows(Check):
                 else f"in {100 * share:.0f} % of the moving rows all joints move against their "
                 "velocities at once"
             )
-            yield self.suspicion(
-                "rows are not in the order of time: they were shuffled", evidence, "certain"
-            )
+            yield self._shuffled(measurement, evidence)
             return
         rows = found.clear & found.moving
         if rows.sum() < 200:
@@ -238,37 +227,22 @@ class LostRows(Check):
         if abs(float(np.median(found.steps[rows])) - 1) > USUAL:
             return  # all steps have another size: a matter of units
         yield from self._bursts(measurement, found, rows)
-        if measurement.lost:
-            return
-        back = float(np.sum(found.along & (found.steps < -WHOLE) & rows) / rows.sum())
-        steps = found.steps[rows & (found.along | (found.steps == 0))]
-        whole = np.abs(steps - np.round(steps)) < WHOLE
-        share, usual, between, none = (
-            float(np.sum(these) / rows.sum())
-            for these in (
-                whole & (steps > 1.5),
-                whole & (np.round(steps) == 1),
-                ~whole & (steps > 1) & (steps < 2),  # stamps that jitter
-                whole & (np.round(steps) == 0),  # rows that repeat, and catch up afterwards
+        if not measurement.lost:
+            yield from self._skipped(measurement, found, rows)
+
+    def _shuffled(self, measurement: Measurement, evidence: str) -> Suspicion:
+        """Rows in no order, or in the order of two sources that alternate."""
+        if _alternate(measurement):
+            return self.suspicion(
+                "every second row is of another source",
+                "from row to row the joints move against their velocities or farther than "
+                "these imply, but from every row to the next but one as they imply: two "
+                "sources were written into one log; keep the rows of one of them",
+                "certain",
             )
+        return self.suspicion(
+            "rows are not in the order of time: they were shuffled", evidence, "certain"
         )
-        if share > SKIPPED and usual > 0.5 and share > OTHERS * max(between, none):
-            measurement.lost = True
-            if back > max(SKIPPED, EXCHANGED * share):
-                yield self.suspicion(
-                    "rows are exchanged with others close to them in time",
-                    f"in {100 * back:.2g} % of the moving rows all joints move against their "
-                    f"velocities at once, and in {100 * share:.2g} % at least twice as far as "
-                    "these imply; sort the rows by the clock of the robot",
-                    "certain" if share > SURELY else "suspected",
-                )
-                return
-            yield self.suspicion(
-                "rows are missing without a gap in the clock",
-                f"in {100 * share:.2g} % of the moving rows all joints move at least twice as far "
-                "in one step as their velocities imply",
-                "certain" if share > SURELY else "suspected",
-            )
 
     def _turned(self, measurement: Measurement, turned: list[int]) -> Iterator[Suspicion]:
         """Recordings in reversed order, unless their torque agrees with the positions instead."""
@@ -303,4 +277,39 @@ class LostRows(Check):
             "hardly ever otherwise; use the time stamps of the robot. Other checks treat the parts "
             "as separate trajectories",
             "certain" if long.sum() > SURE_BURSTS else "suspected",
+        )
+
+    def _skipped(
+        self, measurement: Measurement, found: Elapsed, rows: NDArray[np.bool_]
+    ) -> Iterator[Suspicion]:
+        """Single rows that are missing, or exchanged with others."""
+        back = float(np.sum(found.along & (found.steps < -WHOLE) & rows) / rows.sum())
+        steps = found.steps[rows & (found.along | (found.steps == 0))]
+        whole = np.abs(steps - np.round(steps)) < WHOLE
+        share, usual, between, none = (
+            float(np.sum(these) / rows.sum())
+            for these in (
+                whole & (steps > 1.5),
+                whole & (np.round(steps) == 1),
+                ~whole & (steps > 1) & (steps < 2),  # stamps that jitter
+                whole & (np.round(steps) == 0),  # rows that repeat, and catch up afterwards
+            )
+        )
+        if share <= SKIPPED or usual <= 0.5 or share <= OTHERS * max(between, none):
+            return
+        measurement.lost = True
+        if back > max(SKIPPED, EXCHANGED * share):
+            yield self.suspicion(
+                "rows are exchanged with others close to them in time",
+                f"in {100 * back:.2g} % of the moving rows all joints move against their "
+                f"velocities at once, and in {100 * share:.2g} % at least twice as far as "
+                "these imply; sort the rows by the clock of the robot",
+                "certain" if share > SURELY else "suspected",
+            )
+            return
+        yield self.suspicion(
+            "rows are missing without a gap in the clock",
+            f"in {100 * share:.2g} % of the moving rows all joints move at least twice as far "
+            "in one step as their velocities imply",
+            "certain" if share > SURELY else "suspected",
         )

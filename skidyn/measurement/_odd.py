@@ -90,20 +90,31 @@ class OddRecording(Check):
         silent = _silent(measurement)
         if silent:
             measurement.odd = True
-            yield self.suspicion(
-                f"in {trajectories_told(silent)} the torques of all joints are only noise near "
-                "zero",
-                "joints move there as in the other trajectories, but torques spread less than "
-                f"{QUIET:.0%} of theirs and change at random from row to row: the motors were off, "
-                "or no torque was recorded; leave these files out",
-                "certain",
-            )
+            yield self._without_torque(silent)
             return
         seen = explained(measurement)
         if seen is None:
             return
-        sizes = _sizes(measurement)
-        for run, size in sizes.items():
+        told = list(self._of_all_torques(measurement)) or list(self._exchanged(measurement, seen))
+        if told:
+            measurement.odd = True
+            yield from told
+            return
+        yield from self._of_single_torques(measurement, seen)
+
+    def _without_torque(self, runs: list[int]) -> Suspicion:
+        """Recordings without torque."""
+        return self.suspicion(
+            f"in {trajectories_told(runs)} the torques of all joints are only noise near zero",
+            "joints move there as in the other trajectories, but torques spread less than "
+            f"{QUIET:.0%} of theirs and change at random from row to row: the motors were off, "
+            "or no torque was recorded; leave these files out",
+            "certain",
+        )
+
+    def _of_all_torques(self, measurement: Measurement) -> Iterator[Suspicion]:
+        """Recordings in which all torques are in another unit."""
+        for run, size in _sizes(measurement).items():
             yield self.suspicion(
                 f"in trajectory {run} all torques have a different unit or scale than in the "
                 "other trajectories",
@@ -111,12 +122,10 @@ class OddRecording(Check):
                 "out",
                 "certain",
             )
-        if sizes:
-            measurement.odd = True
-            return
-        exchanged = list(find_exchanges(seen))
-        for pair in exchanged:
-            measurement.odd = True
+
+    def _exchanged(self, measurement: Measurement, seen: Explained) -> Iterator[Suspicion]:
+        """Recordings in which the torques of two joints are exchanged."""
+        for pair in find_exchanges(seen):
             names = measurement.joints(pair.joints)
             yield self.suspicion(
                 f"in trajectory {pair.run} the torques of {names} are exchanged",
@@ -125,40 +134,13 @@ class OddRecording(Check):
                 "suspected",
                 pair.joints,
             )
-        if exchanged:
-            return
+
+    def _of_single_torques(self, measurement: Measurement, seen: Explained) -> Iterator[Suspicion]:
+        """Recordings in which a joint has another zero, or its torque another scale or source."""
         told = _multiples(seen)
-        least = LEAST + np.log(max(1, len(told)))  # of so many torques one may gain by chance
-        scaled, unlike = [], []
-        for k in sorted({one.joint for one in told}):
-            own = [one for one in told if one.joint == k]
-            usual = np.mean([ONE[0] < one.multiple < ONE[1] for one in own])
-            alike = len(own) >= 3 and usual >= MOST
-            for one in own:
-                if not (alike or one.spoils):
-                    continue
-                if _clipped(measurement, one):
-                    continue  # its torque has another multiple because it is saturated
-                within = USUAL[0] <= one.multiple <= USUAL[1]
-                if not within and one.gain > least and abs(one.likeness) > SCALED:
-                    scaled.append(one)
-                elif one.gain > least and one.larger > LARGER and one.likeness < UNLIKE:
-                    # a contact, or a payload of one recording, would look like it
-                    without, left, _ = left_by_effects(seen.fits, k, seen.fits.recording == one.run)
-                    if left > max(LARGER, LEFT * without):
-                        unlike.append(one)
-        shifted = {}
-        worst = max(told, key=lambda one: one.larger, default=None)
-        if worst and worst.larger > SHIFTED and worst.run not in {one.run for one in scaled}:
-            zero = _zero_of(seen.fits, worst.run)
-            if zero is not None:
-                shifted[worst.run] = zero
-                unlike = [one for one in unlike if one.run != worst.run]
-        zero_of_one = measurement.one_zero
-        if zero_of_one is not None and not scaled and not shifted:
-            (run,) = zero_of_one.runs
-            shifted = {run: (zero_of_one.joint, zero_of_one.value, zero_of_one.gain)}
-            unlike = [other for other in unlike if other.run != run]
+        scaled, unlike = _odd_torques(measurement, seen, told)
+        shifted = _other_zeros(measurement, seen.fits, told, scaled)
+        unlike = [one for one in unlike if one.run not in shifted]
         if shifted or scaled:
             # a wrong reading of all recordings may affect one most
             asked = asked_gain(measurement, seen.fits)
@@ -168,41 +150,102 @@ class OddRecording(Check):
             return  # their torques are of other times
         measurement.odd = bool(scaled or unlike or shifted)
         for run, (joint, angle, gain) in shifted.items():
-            yield self.suspicion(
-                f"in trajectory {run} the zero of {measurement.joint(joint)} differs by about "
-                f"{np.rad2deg(angle):.0f} deg from that of the others",
-                "with this correction, common bodies explain the torques of that "
-                f"trajectory better by {gain:.0f} (log-likelihood); fix that file, or leave it out",
-                "suspected",
-                [joint],
-            )
-        for run in sorted({one.run for one in scaled}):
-            own = [one for one in scaled if one.run == run]
-            names = measurement.joints(one.joint for one in own)
-            multiples = ", ".join(f"{one.multiple:.3g}" for one in own)
-            yield self.suspicion(
-                f"in trajectory {run} the torque of {names} has a different sign or scale than in "
-                "the others",
-                f"it is {multiples} times the prediction from the other trajectories, which "
-                f"improves the fit by up to {max(one.gain for one in own):.0f} (log-likelihood); "
-                "fix that file, or leave it out",
-                "suspected",
-                [one.joint for one in own],
-            )
+            yield self._shifted(measurement, run, joint, angle, gain)
+        for run, own in _by_run(scaled):
+            yield self._scaled(measurement, run, own)
         if measurement.frictionless:
             return  # the rest is due to another friction
-        for run in sorted({one.run for one in unlike} - {one.run for one in scaled}):
-            own = [one for one in unlike if one.run == run]
-            names = measurement.joints(one.joint for one in own)
-            shares = ", ".join(f"{one.larger:.2g}" for one in own)
-            yield self.suspicion(
-                f"in trajectory {run} the torque of {names} is nearly unrelated to the motion",
-                f"the prediction from the other trajectories leaves {shares} times as much "
-                "residual there as in all; it may be the torque of another recording, or its "
-                "positions may have a different zero",
-                "suspected",
-                [one.joint for one in own],
-            )
+        known = {one.run for one in scaled}
+        for run, own in _by_run([one for one in unlike if one.run not in known]):
+            yield self._unlike(measurement, run, own)
+
+    def _shifted(
+        self, measurement: Measurement, run: int, joint: int, angle: float, gain: float
+    ) -> Suspicion:
+        """A recording with another zero of a joint."""
+        return self.suspicion(
+            f"in trajectory {run} the zero of {measurement.joint(joint)} differs by about "
+            f"{np.rad2deg(angle):.0f} deg from that of the others",
+            "with this correction, common bodies explain the torques of that "
+            f"trajectory better by {gain:.0f} (log-likelihood); fix that file, or leave it out",
+            "suspected",
+            [joint],
+        )
+
+    def _scaled(self, measurement: Measurement, run: int, own: list[Multiple]) -> Suspicion:
+        """A recording with torques at another scale."""
+        names = measurement.joints(one.joint for one in own)
+        multiples = ", ".join(f"{one.multiple:.3g}" for one in own)
+        return self.suspicion(
+            f"in trajectory {run} the torque of {names} has a different sign or scale than in "
+            "the others",
+            f"it is {multiples} times the prediction from the other trajectories, which "
+            f"improves the fit by up to {max(one.gain for one in own):.0f} (log-likelihood); "
+            "fix that file, or leave it out",
+            "suspected",
+            [one.joint for one in own],
+        )
+
+    def _unlike(self, measurement: Measurement, run: int, own: list[Multiple]) -> Suspicion:
+        """A recording with torques of something else."""
+        names = measurement.joints(one.joint for one in own)
+        shares = ", ".join(f"{one.larger:.2g}" for one in own)
+        return self.suspicion(
+            f"in trajectory {run} the torque of {names} is nearly unrelated to the motion",
+            f"the prediction from the other trajectories leaves {shares} times as much "
+            "residual there as in all; it may be the torque of another recording, or its "
+            "positions may have a different zero",
+            "suspected",
+            [one.joint for one in own],
+        )
+
+
+def _odd_torques(
+    measurement: Measurement, seen: Explained, told: list[Multiple]
+) -> tuple[list[Multiple], list[Multiple]]:
+    """Torques at another scale than in most recordings, and those unrelated to the motion."""
+    least = LEAST + np.log(max(1, len(told)))  # of so many torques one may gain by chance
+    scaled, unlike = [], []
+    for k in sorted({one.joint for one in told}):
+        own = [one for one in told if one.joint == k]
+        usual = np.mean([ONE[0] < one.multiple < ONE[1] for one in own])
+        alike = len(own) >= 3 and usual >= MOST
+        for one in own:
+            if not (alike or one.spoils):
+                continue
+            if _clipped(measurement, one):
+                continue  # its torque has another multiple because it is saturated
+            within = USUAL[0] <= one.multiple <= USUAL[1]
+            if not within and one.gain > least and abs(one.likeness) > SCALED:
+                scaled.append(one)
+            elif one.gain > least and one.larger > LARGER and one.likeness < UNLIKE:
+                # a contact, or a payload of one recording, would look like it
+                without, left, _ = left_by_effects(seen.fits, k, seen.fits.recording == one.run)
+                if left > max(LARGER, LEFT * without):
+                    unlike.append(one)
+    return scaled, unlike
+
+
+def _other_zeros(
+    measurement: Measurement, fits: Fits, told: list[Multiple], scaled: list[Multiple]
+) -> dict[int, tuple[int, float, float]]:
+    """Joint, angle and gain of another zero in the recording that is explained worst, if any."""
+    worst = max(told, key=lambda one: one.larger, default=None)
+    if worst and worst.larger > SHIFTED and worst.run not in {one.run for one in scaled}:
+        zero = _zero_of(fits, worst.run)
+        if zero is not None:
+            return {worst.run: zero}
+    divided = measurement.one_zero
+    if divided is None or scaled:
+        return {}
+    (run,) = divided.runs
+    return {run: (divided.joint, divided.value, divided.gain)}
+
+
+def _by_run(multiples: list[Multiple]) -> Iterator[tuple[int, list[Multiple]]]:
+    """Every recording with its torques."""
+    for run in sorted({one.run for one in multiples}):
+        yield run, [one for one in multiples if one.run == run]
 
 
 def _clipped(measurement: Measurement, one: Multiple) -> bool:

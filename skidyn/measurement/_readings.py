@@ -91,12 +91,53 @@ def find_changes(fits: Fits) -> list[Change]:
 
 
 def _best(fits: Fits, reading: Reading) -> Change | None:
-    """The alternative that gains most and that identified bodies confirm.
+    """The alternative that gains most and that identified bodies confirm."""
+    here = fits.nominal(reading)
+    judged = _judged(fits, reading, here)
+    most = max((c.gain for c in judged), default=0.0)
+    absent = judged[0] if judged and judged[0].kind == "no_gravity" else None
+    if absent is not None and absent.gain >= LEAST and _without_gravity(fits, reading, here):
+        found = _absent_gravity(fits, reading, absent, judged)
+        if found is not None:
+            return found
+        judged = [c for c in judged if c.kind != "gravity"]
+    if (judged or fits.loads) and reading.gravity is None:
+        restored_change = _restored(fits, reading, here)
+        if restored_change is not None and not _explains_more(
+            fits, reading, judged, restored_change
+        ):
+            return restored_change
 
-    Few rounds select the alternatives to be examined in detail.
+    @cache
+    def fought(other: Reading, joints: tuple[int, ...]) -> Duel:
+        return fight(fits, reading, other, joints)
+
+    accepted = _accepted(fits, reading, judged, most)
+    # what a zero beside other bodies must gain: most of all changes, if none of them is confirmed
+    least = OVERWHELMING if accepted else max(OVERWHELMING, most)
+    while accepted:
+        best = _turned(fits, _first(accepted), accepted)
+        worst = int(np.argmax(fits.nominal(best.reading).margin(here)))
+        held = _against_effects(fought(best.reading, best.joints or (worst,)), best)
+        if held is not None:
+            return _or_another_last_body(fits, held)
+        accepted.remove(best)
+    if reading != Reading():
+        return None  # what is read anew already, and bodies, need no other zero
+    for change in judged:
+        if change.kind != "zero" or change.gain < least or change.drop < MOSTLY:
+            continue
+        if abs(change.reading.zero[-1][1]) >= NOTED:
+            return _or_bodies(fought(change.reading, change.joints), change)
+    return None
+
+
+def _judged(fits: Fits, reading: Reading, here: Outcome) -> list[Change]:
+    """Alternatives that gain with the stated bodies, the strongest first.
+
+    Few rounds select those that are examined in detail.
     """
-    here, few = fits.nominal(reading), fits.few
-    screened = _screened(few, reading, alternatives(fits, reading, here))
+    screened = _screened(fits.few, reading, alternatives(fits, reading, here))
     judged = []
     for rough_gain, change in _distinct(screened)[:FINALISTS]:
         if rough_gain > 0:
@@ -111,31 +152,24 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         for c in judged
         if c.gain >= WEAKEST and c.drop >= LEAST_DROP and _all_gain(fits, c, reading, here)
     ]
-    judged.sort(key=lambda c: -round(c.gain, 1))
-    most = max((c.gain for c in judged), default=0.0)
-    absent = judged[0] if judged and judged[0].kind == "no_gravity" else None
-    if absent is not None and absent.gain >= LEAST:
-        if _without_gravity(fits, reading, here):
-            # identified bodies compensate the rest of it
-            restored, kept = _restored_gain(fits, absent.reading, reading)
-            others = [c for c in judged if c.kind == "gravity" and c.gain > absent.gain - TIED]
-            if others and restored < LEAST:  # no torque depends on gravity along it
-                return _by_offsets(fits, absent, others)
-            # if bodies of any mass explain the torque with gravity, the stated ones are wrong
-            if kept > -TIED:
-                return replace(absent, restorable=restored > LEAST)
-            judged = [c for c in judged if c.kind != "gravity"]
-    if (judged or fits.loads) and reading.gravity is None:
-        restored_change = _restored(fits, reading, here)
-        if restored_change is not None and not _explains_more(
-            fits, reading, judged, restored_change
-        ):
-            return restored_change
+    return sorted(judged, key=lambda c: -round(c.gain, 1))
 
-    @cache
-    def fought(other: Reading, joints: tuple[int, ...]) -> Duel:
-        return fight(fits, reading, other, joints)
 
+def _absent_gravity(
+    fits: Fits, reading: Reading, absent: Change, judged: Sequence[Change]
+) -> Change | None:
+    """No gravity, or the direction in which no torque depends on it; None if there is gravity."""
+    # identified bodies compensate the rest of it
+    restored, kept = _restored_gain(fits, absent.reading, reading)
+    others = [c for c in judged if c.kind == "gravity" and c.gain > absent.gain - TIED]
+    if others and restored < LEAST:  # no torque depends on gravity along it
+        return _by_offsets(fits, absent, others)
+    # if bodies of any mass explain the torque with gravity, the stated ones are wrong
+    return replace(absent, restorable=restored > LEAST) if kept > -TIED else None
+
+
+def _accepted(fits: Fits, reading: Reading, judged: Sequence[Change], most: float) -> list[Change]:
+    """Changes of columns that identified bodies confirm, with what they gain by them and rivals."""
     accepted = []
     for change in judged:
         if change.kind == "no_gravity":
@@ -157,21 +191,7 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
             alike = [c for c in alike if change.gain - c.gain < within or _but_for_angle(c, change)]
             rivals = tuple(dict.fromkeys(c.kind for c in alike))
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
-    while accepted:
-        best = _turned(fits, _first(accepted), accepted)
-        most = int(np.argmax(fits.nominal(best.reading).margin(here)))
-        held = _against_effects(fought(best.reading, best.joints or (most,)), best)
-        if held is not None:
-            return _or_another_last_body(fits, held)
-        accepted.remove(best)
-    if reading != Reading():
-        return None  # what is read anew already, and bodies, need no other zero
-    turned = [c for c in judged if c.kind == "zero" and c.gain >= max(OVERWHELMING, most)]
-    for change in turned:
-        angle = abs(change.reading.zero[-1][1])
-        if change.drop >= MOSTLY and angle >= NOTED:
-            return _or_bodies(fought(change.reading, change.joints), change)
-    return None
+    return accepted
 
 
 def _screened(few: Fits, reading: Reading, changes: Iterator[Change]) -> list[tuple[float, Change]]:

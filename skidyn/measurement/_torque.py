@@ -260,48 +260,14 @@ class Columns(Check):
         if rivals:
             certainty = "suspected"
             evidence += f"; {', or '.join(sorted(rivals))} would explain it equally well"
-        if kind == "torque_sign":
-            columns = [f"tau{j + 1}" for j in joints]
-            what = f"the torque of {names} has the opposite sign"
-            remedy = remedy_of("flip", columns)
-        elif kind == "motion_sign":
-            columns = [f"q{j + 1}" for j in joints]
-            what = f"position and velocity of {names} have the opposite sign"
-            remedy = remedy_of("flip", columns)
-        elif kind == "joint_sign":
-            columns = [f"{q}{j + 1}" for j in joints for q in ("q", "tau")]
-            what = f"the direction of {names} is opposite to that of the robot's description"
-            remedy = remedy_of("flip", columns)
+        if kind in GRAVITIES:
+            what, remedy = _of_gravity(kind, final, changes[0].restorable)
         elif kind in ORDERS:
             what, remedy = _ordered(measurement, final)
-        elif kind == "summed":
-            what = (
-                f"the position of {names} includes that of the previous joint: its angle is "
-                "relative to a link other than its parent"
-            )
-            others = {f"q{j + 1}": f"{'-' * (x < 0)}q{j}" for j, x in final.summed if j in joints}
-            remedy = remedy_of("summed", others)
-        elif kind == "zero":
-            values = ", ".join(f"{np.rad2deg(v):.0f} deg" for j, v in final.zero if j in joints)
-            what = f"the zero of {names} is off by about {values}"
-            pairs = {f"q{j + 1}": round(v, 4) for j, v in final.zero if j in joints}
-            remedy = remedy_of("zero", pairs)
+        elif kind.endswith("_sign"):
+            what, remedy = _opposite(kind, names, joints)
         else:
-            gravity = [round(x, 2) + 0.0 for x in (final.gravity or ())]
-            words = ",".join(f"{x:g}" for x in gravity)
-            remedy = (f"--gravity={words}", f"gravity={gravity}")
-            if kind == "gravity":
-                what = (
-                    f"gravity points along ({words}) in the base frame: the robot is mounted in "
-                    "this orientation"
-                )
-            else:
-                what = "the torque contains no gravity: it was removed"
-                if changes[0].restorable:
-                    what += " with the bodies of the description"
-                    remedy = remedy_of("restore_gravity", True)
-                else:
-                    remedy = remedy_of("gravity", "none")
+            what, remedy = _of_positions(kind, names, joints, final)
         return self.suspicion(what, evidence, certainty, joints, remedy)
 
 
@@ -309,6 +275,52 @@ class Columns(Check):
 GRAVITIES = ("gravity", "no_gravity")
 #: Kinds of changes that exchange columns.
 ORDERS = ("order", "motion_order", "torque_order")
+
+
+def _opposite(kind: str, names: str, joints: list[int]) -> tuple[str, tuple[str, str]]:
+    """Text for columns with the opposite sign, and the remedy."""
+    if kind == "torque_sign":
+        what = f"the torque of {names} has the opposite sign"
+        columns = [f"tau{j + 1}" for j in joints]
+    elif kind == "motion_sign":
+        what = f"position and velocity of {names} have the opposite sign"
+        columns = [f"q{j + 1}" for j in joints]
+    else:
+        what = f"the direction of {names} is opposite to that of the robot's description"
+        columns = [f"{q}{j + 1}" for j in joints for q in ("q", "tau")]
+    return what, remedy_of("flip", columns)
+
+
+def _of_positions(
+    kind: str, names: str, joints: list[int], final: Reading
+) -> tuple[str, tuple[str, str]]:
+    """Text for positions relative to another link or from another zero, and the remedy."""
+    if kind == "summed":
+        what = (
+            f"the position of {names} includes that of the previous joint: its angle is "
+            "relative to a link other than its parent"
+        )
+        others = {f"q{j + 1}": f"{'-' * (x < 0)}q{j}" for j, x in final.summed if j in joints}
+        return what, remedy_of("summed", others)
+    values = ", ".join(f"{np.rad2deg(v):.0f} deg" for j, v in final.zero if j in joints)
+    pairs = {f"q{j + 1}": round(v, 4) for j, v in final.zero if j in joints}
+    return f"the zero of {names} is off by about {values}", remedy_of("zero", pairs)
+
+
+def _of_gravity(kind: str, final: Reading, restorable: bool) -> tuple[str, tuple[str, str]]:
+    """Text for gravity in another direction, or that was removed, and the remedy."""
+    if kind == "gravity":
+        gravity = [round(x, 2) + 0.0 for x in (final.gravity or ())]
+        words = ",".join(f"{x:g}" for x in gravity)
+        what = (
+            f"gravity points along ({words}) in the base frame: the robot is mounted in "
+            "this orientation"
+        )
+        return what, (f"--gravity={words}", f"gravity={gravity}")
+    what = "the torque contains no gravity: it was removed"
+    if restorable:
+        return what + " with the bodies of the description", remedy_of("restore_gravity", True)
+    return what, remedy_of("gravity", "none")
 
 
 def _ordered(measurement: Measurement, final: Reading) -> tuple[str, tuple[str, str]]:

@@ -54,8 +54,6 @@ ALONE = 60.0
 #: promises at most 9 on 20 logs without a mistake (``mistakes.py --seed 6610027``), and 33 where
 #: joints move one at a time.
 MOVED = 40.0
-
-
 #: Share of the recordings that may be late by themselves, and log-likelihood that they must gain:
 #: what one carries shifts the lag of few rows, too. How many times as much they leave without it:
 #: friction that is missing is late by itself, but leaves little, and not on all joints, which need
@@ -92,29 +90,11 @@ class TorqueDelay(Check):
             known = not (drift.is_of_log or len(measurement.leaps))
             yield self._drifting(found, drift if known and _is_sure(drift) else None)
             return
-        apart = lags_of_recordings(measurement)
         score = Score(fits)
-        if apart is not None and not is_of_friction(score, apart.lags):
-            yield from self._of_runs(apart)
+        of_runs = self._of_single_runs(measurement, score, found)
+        if of_runs is not None:
+            yield from of_runs
             return
-        odd = late_runs(found)
-        most = max((one.gain for one in odd.values()), default=0.0)
-        if most < found.gains[late_joints(found)].sum():
-            odd = {}  # one joint is late in all of them, and felt more in some
-        odd = {k: one for k, one in odd.items() if not is_of_friction(score, {k: one.lag})}
-        for run, one in odd.items():
-            gained = f"{one.gain:.0f} (log-likelihood), {one.agreeing:.0%} of which is on joints"
-            yield self._late_run(run, one.lag, f"{gained} that agree")
-        if odd:
-            return
-        # a joint whose own lag is uncertain agrees with any
-        use = np.isfinite(found.joints) & (found.errors < max(abs(found.common), SMALLEST))
-        # nor one whose lag is another in its faster rows, as that of a missing effect
-        slow, fast = found.halves.T
-        same = use & (np.abs(slow - fast) < np.maximum(ALIKE, SAME * np.abs(found.joints)))
-        agreeing, n_alike = _agree(found, same)
-        if not agreeing and _all_alike(found, use):
-            agreeing, n_alike = True, fits.n_joints
         # if positions are late, the torque is early by the same time
         early = measurement.late_position
         if early and abs(found.common + early) < max(ALIKE, 0.3 * early):
@@ -130,47 +110,70 @@ class TorqueDelay(Check):
             told = self._late_torque if of_torque else self._late_motion
             yield told(measurement, moved)
             return
-        if (
-            abs(found.common) > max(SMALLEST, ERRORS * found.error)
-            and found.gain > (SURE if measurement.coarse else LEAST)
-            and abs(found.common) > _least_lag(measurement)
-            # a low pass delays faster motion less
-            and (agreeing or _agree(found, use)[0])
-        ):
-            every = range(fits.n_joints)
-            lag = refined_lag(fits, found.common, found.error, every)
-            least = LIKELIER if agreeing else SURE
-            constant = _lowpass(fits, lag, every, least) if not early else None
-            if constant is not None:
-                yield self._filtered("torque", "tau", constant, lag)
-                return
-            if not agreeing:
-                yield from self._of_joints(measurement, fits, found)
-                return
-            lag = _whole(measurement, lag)
-            if abs(lag) < SMALLEST:
-                return
-            only = int(np.nanargmax(found.gains))
-            if n_alike < 2 and lag_gain(fits, lag, [only]) > lag_gain(fits, lag, every) + LEAST:
-                yield self._late_joint(measurement, found, only, lag)
-                return
-            ms = 1e3 * lag
-            if measurement.of_servos:
-                if lag < 0:
-                    yield self._late_command(-lag, found.error, n_alike)
-                return
-            late, n = float(f"{lag + early:.5f}"), measurement.n_joints
-            equally = f", equal in {n_alike} of {n} joints" if n > 1 else ""
-            yield self.suspicion(
-                f"torque is {'late' if ms > 0 else 'early'} relative to the motion by about "
-                f"{abs(ms):.1f} ms",
-                "bodies, friction and rotor inertia explain it best at that lag (standard error "
-                f"{1e3 * found.error:.1f} ms{equally})",
-                "suspected",
-                remedy=remedy_of("late", {"tau": late}),
-            )
+        yield from self._of_all(measurement, fits, found)
+
+    def _of_single_runs(
+        self, measurement: Measurement, score: Score, found: Delay
+    ) -> list[Suspicion] | None:
+        """Recordings that have lags of their own; None if there are none."""
+        apart = lags_of_recordings(measurement)
+        if apart is not None and not is_of_friction(score, apart.lags):
+            return list(self._of_runs(apart))
+        odd = late_runs(found)
+        most = max((one.gain for one in odd.values()), default=0.0)
+        if most < found.gains[late_joints(found)].sum():
+            odd = {}  # one joint is late in all of them, and felt more in some
+        told = []
+        for run, one in odd.items():
+            if not is_of_friction(score, {run: one.lag}):
+                gained = f"{one.gain:.0f} (log-likelihood), {one.agreeing:.0%} of which is on"
+                told.append(self._late_run(run, one.lag, f"{gained} joints that agree"))
+        return told or None
+
+    def _of_all(self, measurement: Measurement, fits: Fits, found: Delay) -> Iterator[Suspicion]:
+        """Torque of all joints, or of those whose lag is not that of all."""
+        # a joint whose own lag is uncertain agrees with any
+        use = np.isfinite(found.joints) & (found.errors < max(abs(found.common), SMALLEST))
+        agreeing, n_alike = _agree_at_any_speed(found, use)
+        # a low pass delays faster motion less
+        if not (_is_large(measurement, found) and (agreeing or _agree(found, use)[0])):
+            yield from self._of_joints(measurement, fits, found)
             return
-        yield from self._of_joints(measurement, fits, found)
+        every = range(fits.n_joints)
+        lag = refined_lag(fits, found.common, found.error, every)
+        least = LIKELIER if agreeing else SURE
+        constant = None if measurement.late_position else _lowpass(fits, lag, every, least)
+        if constant is not None:
+            yield self._filtered("torque", "tau", constant, lag)
+            return
+        if not agreeing:
+            yield from self._of_joints(measurement, fits, found)
+            return
+        lag = _whole(measurement, lag)
+        if abs(lag) < SMALLEST:
+            return
+        only = int(np.nanargmax(found.gains))
+        if n_alike < 2 and lag_gain(fits, lag, [only]) > lag_gain(fits, lag, every) + LEAST:
+            yield self._late_joint(measurement, found, only, lag)
+        elif not measurement.of_servos:
+            yield self._late_torques(measurement, lag, found.error, n_alike)
+        elif lag < 0:
+            yield self._late_command(-lag, found.error, n_alike)
+
+    def _late_torques(
+        self, measurement: Measurement, lag: float, error: float, n_alike: int
+    ) -> Suspicion:
+        """Torques of all joints that are late or early."""
+        ms, n = 1e3 * lag, measurement.n_joints
+        equally = f", equal in {n_alike} of {n} joints" if n > 1 else ""
+        return self.suspicion(
+            f"torque is {'late' if ms > 0 else 'early'} relative to the motion by about "
+            f"{abs(ms):.1f} ms",
+            "bodies, friction and rotor inertia explain it best at that lag (standard error "
+            f"{1e3 * error:.1f} ms{equally})",
+            "suspected",
+            remedy=remedy_of("late", {"tau": float(f"{lag + measurement.late_position:.5f}")}),
+        )
 
     def _of_runs(self, found: LagsOfRecordings) -> Iterator[Suspicion]:
         """Recordings that have lags of their own, or a few of them."""
@@ -314,6 +317,28 @@ def _agree(found: Delay, use: NDArray[np.bool_]) -> tuple[bool, int]:
     enough = count >= len(use) / 2 and count > len(alike) / 2
     most = count >= AGREEING * len(alike) or float(weight[alike].sum()) >= AGREEING
     return enough and most, count
+
+
+def _is_large(measurement: Measurement, found: Delay) -> bool:
+    """Whether the common lag is more than that of errors and of coarse positions."""
+    return (
+        abs(found.common) > max(SMALLEST, ERRORS * found.error)
+        and found.gain > (SURE if measurement.coarse else LEAST)
+        and abs(found.common) > _least_lag(measurement)
+    )
+
+
+def _agree_at_any_speed(found: Delay, use: NDArray[np.bool_]) -> tuple[bool, int]:
+    """As ``_agree``, for joints whose lag is not another in their faster rows.
+
+    That is the lag of a missing effect, unless all of many joints have it.
+    """
+    slow, fast = found.halves.T
+    same = use & (np.abs(slow - fast) < np.maximum(ALIKE, SAME * np.abs(found.joints)))
+    agreeing, n_alike = _agree(found, same)
+    if not agreeing and _all_alike(found, use):
+        return True, len(found.joints)
+    return agreeing, n_alike
 
 
 def _all_alike(found: Delay, use: NDArray[np.bool_]) -> bool:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -223,19 +223,10 @@ class PositionUnit(Check):
         """Positions far outside the limits: in degrees, or of the motors before the gears."""
         turning, limits, known = _limits(measurement)
         largest = np.abs(measurement.signals.q).max(axis=0)
-        named = [
-            any(abs(slope / factor - 1) < NEAR for factor in POSITIONS)
-            for slope, _ in measurement.velocities
-        ]
-        outside = _too_far(measurement, FAR) & ~np.array(named)
+        outside = _unnamed_outside(measurement)
         if not outside.any():
             return  # found by their velocities, joint by joint
-        k = int(np.argmax(np.where(outside, largest / limits, 0)))
-        where = f"the limit is {limits[k]:.3g} rad" if known[k] else "one turn is 6.28 rad"
-        farthest = float(largest[k])
-        if farthest < FAR * limits[k]:  # it was wrapped
-            farthest = float(np.abs(_unwrapped(measurement)[:, k]).max())
-        seen = f"q{k + 1} ({measurement.joint_names[k]}) reaches {farthest:.4g} rad where {where}"
+        seen, farthest = _farthest(measurement, outside)
         degrees = bool(np.all(largest[turning] * DEGREE <= 1.1 * limits[turning]))
         usual = float(np.quantile(largest[turning], 0.5, method="lower"))  # of two the smaller
         if usual < LEAST_DEGREES and degrees:
@@ -249,25 +240,9 @@ class PositionUnit(Check):
         ratio = _fitted_size(measurement, float((largest / limits)[turning].max()), joints)
         gained = _gained_over_degrees(measurement, ratio, joints) if ratio else 0.0
         if ratio is not None and (not degrees or gained >= DECISIVE):
-            value = float(f"{1 / ratio:.4g}")
-            moving = dict.fromkeys(both, value)
-            yield self.suspicion(
-                "positions and velocities are those of the motors before the gears, or have an "
-                "unknown unit",
-                f"{seen}; divided by {ratio:.3g} they explain the torque best",
-                "certain",
-                np.flatnonzero(outside),
-                remedy_of("gain", moving),
-            )
+            yield self._of_motors(seen, ratio, outside, both)
         elif degrees and joints is not None and ratio is not None and gained > LEAST:
-            yield self.suspicion(
-                "positions are in degrees, or those of the motors before the gears",
-                f"{seen}; divided by about {ratio:.3g} they explain the torque better by "
-                f"{gained:.0f} (log-likelihood) than as degrees, which is not decisive; use the "
-                "ratio of the gears, if it is known (--gain)",
-                "certain",
-                np.flatnonzero(outside),
-            )
+            yield self._degrees_or_motors(seen, ratio, gained, outside)
         elif degrees:
             # a single joint may have another zero, or the name of another one
             whole = joints is None or bool(np.all(largest[outside] > SEVERAL_TURNS))
@@ -287,6 +262,33 @@ class PositionUnit(Check):
                 np.flatnonzero(outside),
             )
 
+    def _of_motors(
+        self, seen: str, ratio: float, outside: NDArray[np.bool_], both: Iterable[str]
+    ) -> Suspicion:
+        """Positions and velocities before the gears."""
+        value = float(f"{1 / ratio:.4g}")
+        return self.suspicion(
+            "positions and velocities are those of the motors before the gears, or have an "
+            "unknown unit",
+            f"{seen}; divided by {ratio:.3g} they explain the torque best",
+            "certain",
+            np.flatnonzero(outside),
+            remedy_of("gain", dict.fromkeys(both, value)),
+        )
+
+    def _degrees_or_motors(
+        self, seen: str, ratio: float, gained: float, outside: NDArray[np.bool_]
+    ) -> Suspicion:
+        """Positions that are likelier before the gears than in degrees, but not by far."""
+        return self.suspicion(
+            "positions are in degrees, or those of the motors before the gears",
+            f"{seen}; divided by about {ratio:.3g} they explain the torque better by "
+            f"{gained:.0f} (log-likelihood) than as degrees, which is not decisive; use the "
+            "ratio of the gears, if it is known (--gain)",
+            "certain",
+            np.flatnonzero(outside),
+        )
+
 
 def _limits(measurement: Measurement) -> tuple[NDArray[np.bool_], Array, NDArray[np.bool_]]:
     """Which joints turn, the largest position of each, and whether the description states it."""
@@ -304,6 +306,28 @@ def _too_far(measurement: Measurement, times: float) -> NDArray[np.bool_]:
     """Turning joints whose positions go so many times their limits, or turns, away."""
     turning, limits, _ = _limits(measurement)
     return np.asarray(turning & (np.abs(_unwrapped(measurement)).max(axis=0) > times * limits))
+
+
+def _unnamed_outside(measurement: Measurement) -> NDArray[np.bool_]:
+    """Joints far outside their limits whose velocities do not tell the unit of the position."""
+    named = [
+        any(abs(slope / factor - 1) < NEAR for factor in POSITIONS)
+        for slope, _ in measurement.velocities
+    ]
+    return np.asarray(_too_far(measurement, FAR) & ~np.array(named))
+
+
+def _farthest(measurement: Measurement, outside: NDArray[np.bool_]) -> tuple[str, float]:
+    """In words, how far the joint goes that is farthest outside its limits, and this position."""
+    _, limits, known = _limits(measurement)
+    largest = np.abs(measurement.signals.q).max(axis=0)
+    k = int(np.argmax(np.where(outside, largest / limits, 0)))
+    where = f"the limit is {limits[k]:.3g} rad" if known[k] else "one turn is 6.28 rad"
+    farthest = float(largest[k])
+    if farthest < FAR * limits[k]:  # it was wrapped
+        farthest = float(np.abs(_unwrapped(measurement)[:, k]).max())
+    seen = f"q{k + 1} ({measurement.joint_names[k]}) reaches {farthest:.4g} rad where {where}"
+    return seen, farthest
 
 
 def _unwrapped(measurement: Measurement) -> Array:

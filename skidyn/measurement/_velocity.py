@@ -55,54 +55,38 @@ class Velocity(Check):
             return []  # the unit of the clock or of the positions
         order = _other_order(measurement)
         if order is not None:
-            moved = [k for k, column in enumerate(order) if column != k]
-            numbers = [column + 1 for column in order]
-            names = measurement.joints(moved)
-            told = self.suspicion(
-                f"the velocities of {names} are exchanged",
-                "each is the derivative of another joint's position",
-                "certain",
-                moved,
-                remedy_of("order", {"dq": numbers}),
-            )
-            return [told]
+            return [self._exchanged(measurement, order)]
         constant = _constant(measurement)
         if constant:
             names = measurement.joints(constant)
-            told = self.suspicion(
+            odd = self.suspicion(
                 f"the velocity of {names} does not belong to the position: one of them is constant",
                 "the other changes in most rows",
                 "certain",
                 constant,
             )
-            return [told]
-        groups: dict[str, list[int]] = {}
-        faults = []
-        for k, (slope, correlation) in enumerate(measurement.velocities):
-            slope /= measurement.clock
-            if not np.isfinite(slope) or not measurement.excited[k]:
-                continue
-            if k in measurement.stuck and _cause(slope, correlation) == "other":
-                continue
-            fault = _fault(measurement, k) if correlation < SURE else None
-            if fault is not None:
-                faults.append(self._faulty(measurement, k, fault))
-                continue
-            coarse = step_share(measurement.signals.dq[:, k], measurement.velocity_steps[k])
-            if abs(slope - 1) < max(NEAR, CUT * coarse):
-                continue
-            if k in measurement.millimetres:
-                continue
-            if measurement.clock != 1 and _cause(slope, correlation) in ("scale", "other"):
-                continue  # reported when time is in seconds
-            groups.setdefault(_cause(slope, correlation), []).append(k)
+            return [odd]
+        faults, groups = _faults_and_causes(measurement)
         if "other" in groups and set(groups["other"]) <= set(
             common_lag(measurement, velocity_lags(measurement))[1]
         ):
             del groups["other"]  # they are late
+        told = [self._faulty(measurement, k, fault) for k, fault in faults.items()]
         if not groups:  # in another unit, the noise of a joint at rest looks like motion
-            faults += [self._held(measurement, k, runs) for k, runs in measurement.stuck.items()]
-        return faults + [self._told(measurement, cause, joints) for cause, joints in groups.items()]
+            told += [self._held(measurement, k, runs) for k, runs in measurement.stuck.items()]
+        return told + [self._told(measurement, cause, joints) for cause, joints in groups.items()]
+
+    def _exchanged(self, measurement: Measurement, order: list[int]) -> Suspicion:
+        moved = [k for k, column in enumerate(order) if column != k]
+        numbers = [column + 1 for column in order]
+        names = measurement.joints(moved)
+        return self.suspicion(
+            f"the velocities of {names} are exchanged",
+            "each is the derivative of another joint's position",
+            "certain",
+            moved,
+            remedy_of("order", {"dq": numbers}),
+        )
 
     def _faulty(self, measurement: Measurement, k: int, fault: Fault) -> Suspicion:
         name, column = measurement.joint(k), f"dq{k + 1}"
@@ -182,6 +166,34 @@ class Velocity(Check):
             joints,
             remedy,
         )
+
+
+def _faults_and_causes(
+    measurement: Measurement,
+) -> tuple[dict[int, Fault], dict[str, list[int]]]:
+    """Velocities with a fault, by joint, and joints whose scale is not 1, by its cause."""
+    faults: dict[int, Fault] = {}
+    groups: dict[str, list[int]] = {}
+    for k, (slope, correlation) in enumerate(measurement.velocities):
+        slope /= measurement.clock
+        if not np.isfinite(slope) or not measurement.excited[k]:
+            continue
+        cause = _cause(slope, correlation)
+        if k in measurement.stuck and cause == "other":
+            continue
+        fault = _fault(measurement, k) if correlation < SURE else None
+        if fault is not None:
+            faults[k] = fault
+            continue
+        coarse = step_share(measurement.signals.dq[:, k], measurement.velocity_steps[k])
+        if abs(slope - 1) < max(NEAR, CUT * coarse):
+            continue
+        if k in measurement.millimetres:
+            continue
+        if measurement.clock != 1 and cause in ("scale", "other"):
+            continue  # reported when time is in seconds
+        groups.setdefault(cause, []).append(k)
+    return faults, groups
 
 
 def _fault(measurement: Measurement, k: int) -> Fault | None:
