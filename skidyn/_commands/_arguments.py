@@ -121,6 +121,20 @@ def with_remedies(parser: Any) -> None:
         help="gravity in the base frame, m/s^2 (for a robot on a wall), or none if it was removed "
         "from the torque",
     )
+    _with_column_remedies(fix)
+    _with_row_remedies(fix)
+    fix.add_argument(
+        "--restore-gravity",
+        action="store_true",
+        help="add the gravity torque that was removed from the torque",
+    )
+    fix.add_argument(
+        "--resample", type=float, metavar="HZ", help="average over even steps at this rate"
+    )
+
+
+def _with_column_remedies(fix: Any) -> None:
+    """Remedies that change signals."""
     fix.add_argument(
         "--flip",
         metavar="JOINT,..",
@@ -174,6 +188,10 @@ def with_remedies(parser: Any) -> None:
         default="recorded",
         help="command: magnitudes get the sign of commanded minus measured position",
     )
+
+
+def _with_row_remedies(fix: Any) -> None:
+    """Remedies for time stamps, and for rows that cannot be used."""
     fix.add_argument(
         "--clock",
         choices=("auto", "recorded", "regular"),
@@ -199,14 +217,6 @@ def with_remedies(parser: Any) -> None:
     )
     fix.add_argument(
         "--split-leaps", action="store_true", help="begin a new trajectory where positions jump"
-    )
-    fix.add_argument(
-        "--restore-gravity",
-        action="store_true",
-        help="add the gravity torque that was removed from the torque",
-    )
-    fix.add_argument(
-        "--resample", type=float, metavar="HZ", help="average over even steps at this rate"
     )
 
 

@@ -55,6 +55,10 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--out", type=Output, metavar="LOG", help="file.csv or file.parquet to write"
     )
+    _with_log_to_follow(parser)
+
+
+def _with_log_to_follow(parser: Any) -> None:
     along = parser.add_argument_group("along a log")
     along.add_argument(
         "--model",

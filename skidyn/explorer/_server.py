@@ -31,6 +31,13 @@ SAVED = ("model.skops", "explored.py", "report.html")
 HOST = "127.0.0.1"
 #: Longest request, bytes; those of the page itself have some hundred bytes.
 LONGEST_BODY = 2**16
+#: Headers of every answer to the page.
+HEADERS = {
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": "default-src 'self' 'unsafe-inline'; img-src data:",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+}
 
 
 class Explorer:
@@ -204,6 +211,24 @@ def _refuse_constant(name: str) -> float:
     raise SkidynError(f"{name} is not a number in JSON")
 
 
+async def _body(request: Any) -> bytes | None:
+    """Bytes of a request; None as soon as there are too many."""
+    body = b""
+    async for part in request.stream():
+        body += part
+        if len(body) > LONGEST_BODY:
+            return None
+    return body
+
+
+def _words(body: bytes) -> dict[str, Any]:
+    """Arguments of a request."""
+    words = json.loads(body or b"{}", parse_constant=_refuse_constant)
+    if not isinstance(words, dict):
+        raise SkidynError("an object is expected")
+    return words
+
+
 def make_app(explorer: Explorer, port: int) -> Any:
     """The web application; requests for a host other than this machine at this port are refused."""
     import_optional("starlette", extra="explore")
@@ -217,12 +242,6 @@ def make_app(explorer: Explorer, port: int) -> Any:
     # the report takes long, and the page can be used meanwhile
     beside = {"report": _Worker("skidyn-report"), "progress": _Worker("skidyn-progress")}
     hosts = {f"{HOST}:{port}", f"localhost:{port}"}
-    headers = {
-        "Cache-Control": "no-store",
-        "Content-Security-Policy": "default-src 'self' 'unsafe-inline'; img-src data:",
-        "X-Content-Type-Options": "nosniff",
-        "Referrer-Policy": "no-referrer",
-    }
 
     def refused(request: Request, token: str | None) -> bool:
         right = secrets.compare_digest((token or "").encode(), explorer.token.encode())
@@ -231,30 +250,26 @@ def make_app(explorer: Explorer, port: int) -> Any:
     async def start(request: Request) -> Response:
         if refused(request, request.query_params.get("token")):
             return HTMLResponse("Open the address that skidyn explore printed.", 403)
-        return HTMLResponse(page(), headers=headers)
+        return HTMLResponse(page(), headers=HEADERS)
 
     async def api(request: Request) -> Response:
         if refused(request, request.headers.get("x-token")):
             return JSONResponse({"error": "wrong token"}, 403)
         try:
-            body = b""
-            async for part in request.stream():
-                body += part
-                if len(body) > LONGEST_BODY:
-                    told = f"a request has at most {LONGEST_BODY} bytes"
-                    return JSONResponse({"error": told}, 413, headers=headers)
-            words = json.loads(body or b"{}", parse_constant=_refuse_constant)
-            if not isinstance(words, dict):
-                raise SkidynError("an object is expected")
+            body = await _body(request)
+            if body is None:
+                told = f"a request has at most {LONGEST_BODY} bytes"
+                return JSONResponse({"error": told}, 413, headers=HEADERS)
+            words = _words(body)
             question = request.path_params["question"]
             thread = beside.get(question, worker)
             content = await asyncio.wrap_future(thread.submit(explorer.answer, question, words))
-            return JSONResponse(content, headers=headers)
+            return JSONResponse(content, headers=HEADERS)
         except (LookupError, OSError, TypeError, ValueError, OverflowError) as error:
             told = str(error).encode("utf-8", "backslashreplace").decode()  # lone surrogates
-            return JSONResponse({"error": told}, 400, headers=headers)
+            return JSONResponse({"error": told}, 400, headers=HEADERS)
         except RecursionError:
-            return JSONResponse({"error": "the request is nested too deeply"}, 400, headers=headers)
+            return JSONResponse({"error": "the request is nested too deeply"}, 400, headers=HEADERS)
 
     async def saved(request: Request) -> Response:
         """A saved file, by one of the fixed names."""

@@ -17,6 +17,7 @@ from skidyn._optional import import_optional
 from skidyn.dynamics import transform_inertial
 from skidyn.export._bodies import (
     MUJOCO,
+    Description,
     about_origin,
     central_inertia,
     described,
@@ -224,8 +225,26 @@ def merge_mjcf(
             f"has {', '.join(needed)}"
         )
     frames = _frames(mujoco, world, robot, edits.path)
-    wanted = mujoco_attributes(own)
-    degrees = settings.get("angle", "degree") == "degree"
+    _set_joints(edits, mujoco, world, own, joints, settings.get("angle", "degree") == "degree")
+    _set_bodies(edits, mujoco, world, own, bodies, frames)
+    series, reasons = series_joints(model, own)
+    names = {world.joint(k).name for k in range(world.njnt)}
+    reasons |= insert_series(edits, joints, bodies, names, world.nkey, series, robot)
+    data = edits.text()
+    _check_loads(mujoco, data, edits.path)
+    return write_files(path, data, model, [t for t in own.left if t not in series], reasons)
+
+
+def _set_joints(
+    edits: Edits,
+    mujoco: Any,
+    world: Any,
+    own: Description,
+    joints: dict[str, Element],
+    degrees: bool,
+) -> None:
+    """Identified numbers of the joints, where they differ from those of the file."""
+    robot, wanted = own.robot, mujoco_attributes(own)
     for j, name in enumerate(robot.joint_names):
         index = mujoco.mj_name2id(world, mujoco.mjtObj.mjOBJ_JOINT, name)
         dof, place = world.jnt_dofadr[index], world.jnt_qposadr[index]
@@ -243,7 +262,18 @@ def merge_mjcf(
                 new[key] = numbers(np.rad2deg(values[j]) if turns else values[j])
         if new:
             edits.set_attributes(joints[name], new)
-    for body, name in enumerate(robot.body_joints):
+
+
+def _set_bodies(
+    edits: Edits,
+    mujoco: Any,
+    world: Any,
+    own: Description,
+    bodies: dict[str, Element],
+    frames: list[tuple[np.ndarray, np.ndarray]],
+) -> None:
+    """Identified inertia of the bodies, in their frames."""
+    for body, name in enumerate(own.robot.body_joints):
         index = mujoco.mj_name2id(world, mujoco.mjtObj.mjOBJ_JOINT, name)
         carrier = int(world.jnt_bodyid[index])
         # The body's own share is the identified parameters minus those of the bodies that are
@@ -258,12 +288,6 @@ def merge_mjcf(
             edits.replace(inertial, text)
         else:
             edits.insert_first(element, text)
-    series, reasons = series_joints(model, own)
-    names = {world.joint(k).name for k in range(world.njnt)}
-    reasons |= insert_series(edits, joints, bodies, names, world.nkey, series, robot)
-    data = edits.text()
-    _check_loads(mujoco, data, edits.path)
-    return write_files(path, data, model, [t for t in own.left if t not in series], reasons)
 
 
 def _joints_in_bodies(root: Element) -> tuple[dict[str, Element], dict[str, Element]]:

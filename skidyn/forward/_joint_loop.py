@@ -184,94 +184,133 @@ class JointLoop:
 
     def _run(self, parameters: Mapping[str, Array]) -> tuple[Array, Array]:
         """Positions of the motor, and lag of the link behind it; empty without a gear."""
-        given = {k: np.asarray(v, dtype=float)[:, None] for k, v in parameters.items()}
-        n_models = len(next(iter(given.values())))
-        p = {k: given.get(k, np.zeros((n_models, 1))) for k in _ALL}
-        command = _Command(self, self.delay + p["late"][:, 0])
-        n_samples, n_pieces = self.q.shape
-        q = np.tile(self.q[0], (n_models, 1))
-        v = np.tile(self.dq[0], (n_models, 1))
-        more = p["inertia"] * self.size
-        gear = _Gear(self, p) if "compliance" in given else None
-        dahl = "presliding" in given
-        bent = np.sign(v) * p["coulomb"]
-        if gear is not None:
-            gear.hang(0, q, v, True)
-        result = np.empty((n_samples, n_models, n_pieces))
-        behind = np.empty(result.shape if gear is not None else (0, n_models, 0))
-        servo_of = _Servo(self, p)
-        limit, limited, fall = self.limit, bool(np.isfinite(self.limit)), self.fall
-        dry_of = _Dry(self, p)
-        heavier, squares = 1 + p["weight"], bool(p["square"].any())
-        offset, brake = 2 * p["offset"], np.maximum(p["coulomb"], TINY)
+        joint = _Joint(
+            self, {k: np.asarray(v, dtype=float)[:, None] for k, v in parameters.items()}
+        )
+        gear = joint.gear
+        result = np.empty((len(self.q), *joint.q.shape))
+        behind = np.empty(result.shape if gear is not None else (0, len(joint.q), 0))
         held = np.asarray(self.held.any(axis=1))
         parts = np.ceil(np.diff(self.time, axis=0).max(axis=1) / STEP - 1e-9).astype(int)
-        for i in range(n_samples):
+        for i in range(len(self.q)):
             if held[i]:
-                back: NDArray[np.bool_] = self.held[i]
-                q, v = np.where(back, self.q[i], q), np.where(back, self.dq[i], v)
-                bent = np.where(back, np.sign(v) * p["coulomb"], bent)
-                if gear is not None:
-                    gear.hang(i, q, v, back)
-            result[i] = q
+                joint.reset(i)
+            result[i] = joint.q
             if gear is not None:
-                behind[i] = q - gear.y
-            if i == n_samples - 1:
-                break
-            n_parts = max(1, int(parts[i]))
-            h = (self.time[i + 1] - self.time[i]) / n_parts
-            half = h / 2
-            (r1, d1), bias1 = command.at(i, 0.0), self.bias[i]
-            for part in range(n_parts):
-                a, b = part / n_parts, (part + 1) / n_parts
-                (r0, d0), (r1, d1) = (r1, d1), command.at(i, b)
-                bias0, bias1 = bias1, self._at(self.bias, i, b)
-                bias = heavier * (bias0 + bias1)
-                m = self._at(self.inertia, i, a) + more
-                drag = p["viscous"] + p["square"] * np.abs(v) if squares else p["viscous"]
-                servo = servo_of.torque(r0 - q) + self.damping * (d0 - v)
-                if limited:
-                    servo = np.minimum(np.maximum(servo, -limit - fall * v), limit - fall * v)
-                drive = servo - drag * v + offset
-                if gear is None:
-                    push, mass = m * v + half * (drive - bias), m + half * drag
-                else:
-                    push, mass = gear.push(half, q, v, m, bias)
-                    push, mass = push + half * drive, mass + half * drag
-                if dahl:
-                    dry: Any = 0.0
-                    yields = 1 - bent * np.sign(v) / brake
-                    push = push - h * bent
-                    mass = mass + h * half * p["presliding"] * np.maximum(yields, 0.0)
-                else:
-                    dry = h * dry_of.level(i, v, r1 - q)
-                # The servo at the end of the step, without its damping and without the motion until
-                # then.
-                error = r1 - q - half * v
-                pull = push + half * (servo_of.torque(error) + self.damping * d1)
-                stiffer = half * (self.damping + half * servo_of.slope(error))
-                new = _held(pull, dry) / (mass + stiffer)
-                if limited:
-                    servo = servo_of.torque(error - half * new) + self.damping * (d1 - new)
-                    beyond = np.abs(servo + fall * new) > limit
-                    if beyond.any():
-                        most = np.clip(servo, -limit, limit)
-                        slower = mass + half * fall
-                        new = np.where(beyond, _held(push + half * most, dry) / slower, new)
-                if gear is not None:
-                    gear.move(half, new)
-                way = half * (v + new)
-                if dahl:
-                    turn = np.abs(way) * bent / brake
-                    bent = bent + p["presliding"] * (way - turn)
-                    bent = np.clip(bent, -p["coulomb"], p["coulomb"])
-                q, v = q + way, new
+                behind[i] = joint.q - gear.y
+            if i < len(parts):
+                joint.advance(i, max(1, int(parts[i])))
         return np.moveaxis(result, 0, 1), np.moveaxis(behind, 0, 1)
 
-    @staticmethod
-    def _at(values: Array, i: int, share: float) -> Array:
-        """Values interpolated between sample i and the next."""
-        return np.asarray((1 - share) * values[i] + share * values[i + 1])
+
+class _Joint:
+    """Position and velocity of the motor in all models and pieces, shape (n_models, n_pieces)."""
+
+    def __init__(self, loop: JointLoop, given: Mapping[str, Array]) -> None:
+        n_models = len(next(iter(given.values())))
+        p = {k: given.get(k, np.zeros((n_models, 1))) for k in _ALL}
+        self.loop, self.p = loop, p
+        self.command = _Command(loop, loop.delay + p["late"][:, 0])
+        self.servo, self.dry = _Servo(loop, p), _Dry(loop, p)
+        self.limited, self.dahl = bool(np.isfinite(loop.limit)), "presliding" in given
+        self.more, self.heavier = p["inertia"] * loop.size, 1 + p["weight"]
+        self.offset, self.squares = 2 * p["offset"], bool(p["square"].any())
+        self.brake = np.maximum(p["coulomb"], TINY)
+        self.q, self.v = (np.tile(x[0], (n_models, 1)) for x in (loop.q, loop.dq))
+        self.bent = np.sign(self.v) * p["coulomb"]
+        self.gear = _Gear(loop, p) if "compliance" in given else None
+        if self.gear is not None:
+            self.gear.hang(0, self.q, self.v, True)
+
+    def reset(self, i: int) -> None:
+        """Return to the log in the pieces whose servo may be at its limit at a sample."""
+        back: NDArray[np.bool_] = self.loop.held[i]
+        self.q = np.where(back, self.loop.q[i], self.q)
+        self.v = np.where(back, self.loop.dq[i], self.v)
+        self.bent = np.where(back, np.sign(self.v) * self.p["coulomb"], self.bent)
+        if self.gear is not None:
+            self.gear.hang(i, self.q, self.v, back)
+
+    def advance(self, i: int, n_parts: int) -> None:
+        """Move from a sample to the next in some steps."""
+        loop = self.loop
+        h = (loop.time[i + 1] - loop.time[i]) / n_parts
+        after, bias1 = self.command.at(i, 0.0), loop.bias[i]
+        for part in range(n_parts):
+            a, b = part / n_parts, (part + 1) / n_parts
+            before, after = after, self.command.at(i, b)
+            bias0, bias1 = bias1, _between(loop.bias, i, b)
+            m = _between(loop.inertia, i, a) + self.more
+            self._step(i, h, m, self.heavier * (bias0 + bias1), before, after)
+
+    def _step(
+        self,
+        i: int,
+        h: Array,
+        m: Array,
+        bias: Array,
+        before: tuple[Array, Array],
+        after: tuple[Array, Array],
+    ) -> None:
+        """Move for ``h`` s, with the commands before and after it; ``bias`` is the sum of both."""
+        half, v = h / 2, self.v
+        push, mass = self._push(half, m, bias, before)
+        if self.dahl:
+            dry: Any = 0.0
+            yields = 1 - self.bent * np.sign(v) / self.brake
+            push = push - h * self.bent
+            mass = mass + h * half * self.p["presliding"] * np.maximum(yields, 0.0)
+        else:
+            dry = h * self.dry.level(i, v, after[0] - self.q)
+        new = self._new_velocity(half, push, mass, dry, after)
+        if self.gear is not None:
+            self.gear.move(half, new)
+        way = half * (v + new)
+        if self.dahl:
+            turn = np.abs(way) * self.bent / self.brake
+            bent = self.bent + self.p["presliding"] * (way - turn)
+            self.bent = np.clip(bent, -self.p["coulomb"], self.p["coulomb"])
+        self.q, self.v = self.q + way, new
+
+    def _push(
+        self, half: Array, m: Array, bias: Array, command: tuple[Array, Array]
+    ) -> tuple[Array, Array]:
+        """Impulse and mass without dry friction and the servo at the end of the step."""
+        p, v, loop = self.p, self.v, self.loop
+        drag = p["viscous"] + p["square"] * np.abs(v) if self.squares else p["viscous"]
+        servo = self.servo.torque(command[0] - self.q) + loop.damping * (command[1] - v)
+        if self.limited:
+            limit, slower = loop.limit, loop.fall * v
+            servo = np.minimum(np.maximum(servo, -limit - slower), limit - slower)
+        drive = servo - drag * v + self.offset
+        if self.gear is None:
+            return m * v + half * (drive - bias), m + half * drag
+        push, mass = self.gear.push(half, self.q, v, m, bias)
+        return push + half * drive, mass + half * drag
+
+    def _new_velocity(
+        self, half: Array, push: Array, mass: Array, dry: Any, command: tuple[Array, Array]
+    ) -> Array:
+        """Velocity of the motor at the end of a step."""
+        (r1, d1), damping, limit = command, self.loop.damping, self.loop.limit
+        # The servo at the end of the step, without its damping and without the motion until then.
+        error = r1 - self.q - half * self.v
+        pull = push + half * (self.servo.torque(error) + damping * d1)
+        stiffer = half * (damping + half * self.servo.slope(error))
+        new = _held(pull, dry) / (mass + stiffer)
+        if self.limited:
+            servo = self.servo.torque(error - half * new) + damping * (d1 - new)
+            beyond = np.abs(servo + self.loop.fall * new) > limit
+            if beyond.any():
+                most = np.clip(servo, -limit, limit)
+                slower = mass + half * self.loop.fall
+                new = np.where(beyond, _held(push + half * most, dry) / slower, new)
+        return np.asarray(new)
+
+
+def _between(values: Array, i: int, share: float) -> Array:
+    """Values interpolated between sample i and the next."""
+    return np.asarray((1 - share) * values[i] + share * values[i + 1])
 
 
 class _Dry:

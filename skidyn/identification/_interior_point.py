@@ -162,65 +162,82 @@ def _triangular(factor: Array, target: Array) -> tuple[Array, Array]:
 
 def _step(point: _Point, data: _Data, linear: Linear, least: float) -> tuple[_Point, float]:
     """One step of Mehrotra's predictor and corrector, toward products of at least ``least``."""
-    n, p = 10 * len(point.bodies), len(point.x)
-    roots, inverse_roots, scaled = _scaling(point.bodies, point.duals)
-    changes = np.einsum("nij,ajk,nlk->nail", roots, SYMMETRIC, roots)
-    own = from_pseudo_inertia(changes.reshape(-1, 4, 4)).reshape(-1, 10, 10)
-    units = block_diag(*own.transpose(0, 2, 1), np.eye(p - n))
-    stiffness = np.sqrt(point.multipliers / point.slack)
-    held = np.eye(p)[:n]
-    rows = np.vstack([data.factor @ units, held, stiffness[:, None] * (linear.C @ units)])
-    free = _null_space(linear.E @ units) if len(linear.e) else np.eye(p)
-    q, triangle = np.linalg.qr(rows @ free)
-    left = data.target - data.factor @ point.x
-    price = solve_triangular(triangle, free.T @ (units.T @ data.cost), trans="T")
-    sums = (scaled[:, :, None] + scaled[:, None]) / 2
+    equations = _Equations(point, data, linear)
+    ahead = equations.direction(least, np.zeros_like(point.bodies), np.zeros_like(point.slack))
+    share = max((1 - min(1.0, equations.reach(ahead))) ** 3, LEAST_CENTRING)
+    mu = max(least, share * point.gap)
+    bent = ahead.change @ ahead.answer
+    found = equations.direction(
+        mu, (bent + bent.transpose(0, 2, 1)) / 2, ahead.slack * ahead.multipliers
+    )
+    length = min(1.0, TOWARD_BORDER * equations.reach(found))
+    return equations.moved(found, length), length
 
-    def direction(mu: float, second: Array, third: Array) -> _Direction:
+
+class _Equations:
+    """Equations of a step from a point, in the scaling in which P and Z are the same."""
+
+    def __init__(self, point: _Point, data: _Data, linear: Linear) -> None:
+        self.point, self.linear = point, linear
+        n, p = 10 * len(point.bodies), len(point.x)
+        roots, self.inverse_roots, self.scaled = _scaling(point.bodies, point.duals)
+        changes = np.einsum("nij,ajk,nlk->nail", roots, SYMMETRIC, roots)
+        own = from_pseudo_inertia(changes.reshape(-1, 4, 4)).reshape(-1, 10, 10)
+        self.units = block_diag(*own.transpose(0, 2, 1), np.eye(p - n))
+        self.stiffness = np.sqrt(point.multipliers / point.slack)
+        held = np.eye(p)[:n]
+        limits = self.stiffness[:, None] * (linear.C @ self.units)
+        rows = np.vstack([data.factor @ self.units, held, limits])
+        self.free = _null_space(linear.E @ self.units) if len(linear.e) else np.eye(p)
+        self.q, self.triangle = np.linalg.qr(rows @ self.free)
+        self.left = data.target - data.factor @ point.x
+        self.price = solve_triangular(
+            self.triangle, self.free.T @ (self.units.T @ data.cost), trans="T"
+        )
+
+    def direction(self, mu: float, second: Array, third: Array) -> _Direction:
+        """Step toward products of ``mu``; the others are their parts of second order."""
+        point, scaled = self.point, self.scaled
+        n = 10 * len(point.bodies)
+        sums = (scaled[:, :, None] + scaled[:, None]) / 2
         # Target values of the products P Z and of slack times multiplier, minus the present ones.
         lacking = (mu * np.eye(4) - _diagonal(scaled**2) - second) / sums
         answer = _diagonal(scaled) + lacking
         wanted_multipliers = (mu - third) / point.slack
         wanted = np.r_[
-            left,
+            self.left,
             np.einsum("nij,aji->na", answer, SYMMETRIC).ravel(),
-            -wanted_multipliers / stiffness,
+            -wanted_multipliers / self.stiffness,
         ]
-        own_step = free @ solve_triangular(triangle, q.T @ wanted - price)
-        step = units @ own_step
+        own_step = self.free @ solve_triangular(self.triangle, self.q.T @ wanted - self.price)
+        step = self.units @ own_step
         change = np.einsum("na,aij->nij", own_step[:n].reshape(-1, 10), SYMMETRIC)
-        ds = -linear.C @ step
-        dm = wanted_multipliers - point.multipliers - stiffness**2 * ds
+        ds = -self.linear.C @ step
+        dm = wanted_multipliers - point.multipliers - self.stiffness**2 * ds
         return _Direction(step, change, lacking - change, ds, dm)
 
-    def reach(d: _Direction) -> float:
+    def reach(self, d: _Direction) -> float:
         """Longest step inside the limits."""
-        root = 1 / np.sqrt(scaled)
+        root = 1 / np.sqrt(self.scaled)
         rates = [
             np.linalg.eigvalsh(root[:, :, None] * m * root[:, None]) for m in (d.change, d.answer)
         ]
-        rates += [d.slack / point.slack, d.multipliers / point.multipliers]
+        rates += [d.slack / self.point.slack, d.multipliers / self.point.multipliers]
         worst = min(float(np.min(rate, initial=0.0)) for rate in rates)
         return -1 / min(worst, -1e-6)
 
-    ahead = direction(least, np.zeros_like(point.bodies), np.zeros_like(point.slack))
-    share = max((1 - min(1.0, reach(ahead))) ** 3, LEAST_CENTRING)
-    mu = max(least, share * point.gap)
-    bent = ahead.change @ ahead.answer
-    found = direction(mu, (bent + bent.transpose(0, 2, 1)) / 2, ahead.slack * ahead.multipliers)
-    length = min(1.0, TOWARD_BORDER * reach(found))
-    x = point.x + length * found.step
-    duals = _diagonal(scaled) + length * found.answer
-    return (
-        _Point(
+    def moved(self, d: _Direction, length: float) -> _Point:
+        """The point after a step of some length."""
+        x = self.point.x + length * d.step
+        duals = _diagonal(self.scaled) + length * d.answer
+        back = self.inverse_roots
+        return _Point(
             x,
-            pseudo_inertia(x[:n].reshape(-1, 10)),
-            linear.b - linear.C @ x,
-            np.einsum("nji,njk,nkl->nil", inverse_roots, duals, inverse_roots),
-            point.multipliers + length * found.multipliers,
-        ),
-        length,
-    )
+            pseudo_inertia(x[: 10 * len(self.point.bodies)].reshape(-1, 10)),
+            self.linear.b - self.linear.C @ x,
+            np.einsum("nji,njk,nkl->nil", back, duals, back),
+            self.point.multipliers + length * d.multipliers,
+        )
 
 
 def _scaling(bodies: Array, duals: Array) -> tuple[Array, Array, Array]:

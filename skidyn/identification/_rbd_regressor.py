@@ -6,14 +6,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from copy import copy
-from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils.metaestimators import available_if
-from sklearn.utils.validation import _check_sample_weight
 
 from skidyn._checks import warn_about_log
 from skidyn._columns import ColumnSpec
@@ -22,6 +20,7 @@ from skidyn._validation import validate_motion
 from skidyn.effects import Term, TermSum, make_terms
 from skidyn.evidence import (
     Evidence,
+    Fit,
     Problem,
     evidence_of_rows,
     evidence_of_signals,
@@ -35,11 +34,17 @@ from skidyn.evidence import (
 )
 from skidyn.forward import Controller, references
 from skidyn.identification._constraints import BodyConstraints
-from skidyn.identification._estimators import ESTIMATORS, Estimator, find_estimator
+from skidyn.identification._estimators import Estimator, find_estimator
 from skidyn.identification._every_sample import may_take_samples, predicts_better
 from skidyn.identification._identifiability import condition_number
 from skidyn.identification._instrumental import instrument_rows
 from skidyn.identification._output_error import refine_by_simulation
+from skidyn.identification._parameters import (
+    check_data,
+    checked_estimator,
+    checked_weight,
+    keeps_no_rows,
+)
 from skidyn.identification._prediction import Prediction
 from skidyn.identification._recordings import remember
 from skidyn.identification._regression import Regression, Solution
@@ -51,16 +56,6 @@ from skidyn.robots import Robot, find_base_parameters
 
 #: Number of groups of trajectories whose evidence partial_fit keeps separate, for standard errors.
 GROUPS = 20
-
-
-def _keeps_no_rows(model: RBDRegressor) -> bool:
-    """Whether evidence is enough for the estimator of a model."""
-    if getattr(ESTIMATORS.get(model.estimator), "rows", False):
-        raise AttributeError(
-            f"estimator={model.estimator!r} needs single rows, which partial_fit does not keep; "
-            "use fit, or another estimator"
-        )
-    return True
 
 
 class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEstimator):
@@ -272,29 +267,11 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
             A parameter is invalid; instruments are missing, not accepted or have different rows; a
             controller is not accepted or invalid.
         """
-        method = self._method()
-        if controller is not None and not isinstance(controller, Controller):
-            raise ValueError(
-                f"controller={controller!r}; expected a skidyn.simulation.Controller or None"
-            )
-        if controller is not None and not method.simulates:
-            raise ValueError(
-                f"estimator={self.estimator!r} does not accept a controller; 'output_error' does"
-            )
-        if instruments is not None and self.estimator != "instrumental":
-            raise ValueError(
-                f"estimator={self.estimator!r} does not accept instruments; 'instrumental' does"
-            )
+        method = checked_estimator(self)
+        check_data(self, method, instruments, controller)
         self.__dict__.pop("recordings_", None)
         signals, torque, order = self._begin(X, y, first=True)
-        weight = None
-        if sample_weight is not None:
-            weight = _check_sample_weight(sample_weight, torque, dtype=np.float64)[order]
-            if np.any(weight < 0) or not np.any(weight > 0):
-                raise ValueError(
-                    "sample_weight must not be negative, and not zero for all samples; "
-                    f"it lies between {weight.min():g} and {weight.max():g}"
-                )
+        weight = checked_weight(sample_weight, torque, order)
         terms = make_terms(self.effects, self.robot_.n_joints)
         self.recordings_ = remember(signals, terms)
         plain = self.parameters == "identified" and instruments is None and not method.rows
@@ -312,13 +289,8 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         self.rows_ = "averaged"
         self.evidence_ = Evidence.from_problem(whole, fit.terms)
         self.n_parts_ = 0
-        every = Regression.from_problem(whole, fit, others if whole is problem else None)
+        every, shown = _regressions(problem, whole, fit, others, weight)
         kept = np.searchsorted(whole.rigid_index, problem.rigid_index)
-        shown = every if whole is problem else Regression.from_problem(problem, fit, others)
-        if weight is not None:
-            # Rows have a mean weight of 1; the samples have another.
-            mean = float(weight[weight > 0].mean())
-            every, shown = every.copied(mean), shown.copied(mean)
         solution = self._solve(method, every, shown, kept)
         self._store(every, solution)
         if method.simulates:
@@ -414,7 +386,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         )
         return self
 
-    @available_if(_keeps_no_rows)
+    @available_if(keeps_no_rows)
     def partial_fit(self, X: Any, y: Any) -> RBDRegressor:
         """Add a part of the data, and identify the model from all parts so far.
 
@@ -449,7 +421,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         AttributeError
             The estimator, such as the robust one, needs single rows, which are not kept.
         """
-        self._method()
+        checked_estimator(self)
         first = not hasattr(self, "evidence_")
         signals, torque, _ = self._begin(X, y, first=first)
         given = self.effects if first else self.effect_terms_
@@ -495,35 +467,9 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         parameters = self.get_params(deep=False) | {"effects": [*self.effects, *more]}
         return type(self)(**parameters)
 
-    def _method(self) -> Estimator:
-        """The estimator; raises an error for parameters without effect."""
-        if self.parameters not in ("identified", "nominal"):
-            raise ValueError(f"parameters={self.parameters!r}; expected 'identified' or 'nominal'")
-        if not isinstance(self.consistent, bool | np.bool_ | BodyConstraints):
-            raise ValueError(
-                f"consistent={self.consistent!r}; expected True, False or BodyConstraints(...)"
-            )
-        if not (self.smooth is None or isinstance(self.smooth, bool | np.bool_)):
-            raise ValueError(f"smooth={self.smooth!r}; expected True, False or None")
-        for name, none in (("forgetting", False), ("prior_std", True), ("horizon", True)):
-            value = getattr(self, name)
-            number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
-            if not (number or (none and value is None)):
-                raise ValueError(f"{name}={value!r}; expected a number{' or None' if none else ''}")
-        if not 0 < self.forgetting <= 1:
-            raise ValueError(f"forgetting={self.forgetting!r}; expected a weight above 0, up to 1")
-        if self.prior_std is not None and not self.prior_std > 0:
-            raise ValueError(f"prior_std={self.prior_std!r}; expected a number above 0, or None")
-        if self.estimator == "entropic" and self.prior_std == np.inf:
-            raise ValueError(
-                "prior_std=inf leaves estimator='entropic' without a prior; give a finite number, "
-                "None, or estimator='ordinary' with consistent=True"
-            )
-        return find_estimator(self.estimator)
-
     def _store_evidence(self, evidence: Evidence, terms: Sequence[Term]) -> None:
         """Identify from evidence alone."""
-        method = self._method()
+        method = checked_estimator(self)
         regression, solution = self._solve_evidence(method, evidence, terms)
         self.evidence_ = evidence
         self._store(regression, solution)
@@ -569,3 +515,20 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         self.condition_number_ = condition_number(rows[:, shown])
         for name, value in solution.attributes.items():
             setattr(self, name, value)
+
+
+def _regressions(
+    problem: Problem,
+    whole: Problem,
+    fit: Fit,
+    instruments: list[Array] | None,
+    weight: Array | None,
+) -> tuple[Regression, Regression]:
+    """Regression of all base parameters, and of those that the data shows."""
+    every = Regression.from_problem(whole, fit, instruments if whole is problem else None)
+    shown = every if whole is problem else Regression.from_problem(problem, fit, instruments)
+    if weight is not None:
+        # Rows have a mean weight of 1; the samples have another.
+        mean = float(weight[weight > 0].mean())
+        every, shown = every.copied(mean), shown.copied(mean)
+    return every, shown

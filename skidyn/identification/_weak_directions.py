@@ -25,7 +25,7 @@ P. C. Hansen (1998), Rank-Deficient and Discrete Ill-Posed Problems, chapter 4 (
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,20 +80,10 @@ def keep_weak_directions(
     torque = [np.sqrt(np.mean(y**2)) if len(y) else 1.0 for y in whole.target]
     noise = np.maximum(solution.noise, LEAST_NOISE * max(torque) or 1.0)
     grams, cross = whole.products(noise)
-    total = grams.sum(0)
-    # Effects are fitted again together with the rigid body.
-    size = np.sqrt(np.diag(total)[n:])
-    size[size == 0] = 1.0
-    inner = total[n:, n:] / size[:, None] / size
-    follow = np.linalg.lstsq(inner, total[n:, :n] / size[:, None], rcond=1e-10)[0] / size[:, None]
-    root = prior_root(whole.robot)
-    information = total[:n, :n] - total[:n, n:] @ follow
-    values, vectors = np.linalg.eigh(root.T @ information @ root)
-    values = np.where(values > ROUNDING * values[-1], values, 0.0)
-    directions = root @ vectors
-    into = vectors.T @ np.linalg.inv(root)
+    found = _Directions.of(whole, grams.sum(0))
+    values, directions, follow = found.values, found.directions, found.follow
 
-    z = into @ coefficients[:n]
+    z = found.into @ coefficients[:n]
     spread, excess = _spreads(z, values)
     known = values * spread**2 / excess
     share = known**POWER / (1 + known**POWER)
@@ -108,17 +98,9 @@ def keep_weak_directions(
     coefficients[n:] -= follow @ moved
 
     if whole.instruments is None:
-        # The same pull on the fits without a fold, in coordinates in which it is diagonal.
-        change = block_diag(directions, np.eye(p - n))
-        pull = np.zeros(p)
-        floor = np.maximum(values, ROUNDING * max(values[-1], 1e-300))
-        pull[:n] = np.minimum((1 - share) / np.maximum(share, 1 / MOST_PULL), MOST_PULL) * floor
-        _, left = solve_left_out(
-            change.T @ grams @ change, cross @ change, (np.diag(pull), np.zeros(p))
-        )
-        left = left @ change.T
+        left = _pulled(found, share, grams, cross)
     else:
-        shift = left[:, :n] @ (directions @ ((share - 1)[:, None] * into)).T
+        shift = left[:, :n] @ (directions @ ((share - 1)[:, None] * found.into)).T
         left = left + np.hstack([shift, -shift @ follow.T])
     open_ = directions * (np.sqrt(1 - share) * spread)
     return replace(
@@ -128,6 +110,55 @@ def keep_weak_directions(
         urdf_std=spread if trusted else np.inf,
         open=np.hstack([open_.T, -open_.T @ follow.T]),
     )
+
+
+@dataclass(frozen=True)
+class _Directions:
+    """Directions in which data and URDF are independent, effects being fitted again.
+
+    Attributes
+    ----------
+    values : ndarray of shape (n_rigid,)
+        Information of the data about each, in ascending order.
+    directions, into : ndarray of shape (n_rigid, n_rigid)
+        Base parameters by the coordinates in these directions, and the coordinates by them.
+    follow : ndarray of shape (n_effects, n_rigid)
+        Decrease of the effects' coefficients for an increase of each base parameter.
+    """
+
+    values: Array
+    directions: Array
+    into: Array
+    follow: Array
+
+    @classmethod
+    def of(cls, whole: Regression, total: Array) -> _Directions:
+        """Directions of a regression with the normal equations ``total``."""
+        n = whole.n_rigid
+        size = np.sqrt(np.diag(total)[n:])
+        size[size == 0] = 1.0
+        inner = total[n:, n:] / size[:, None] / size
+        mixed = total[n:, :n] / size[:, None]
+        follow = np.linalg.lstsq(inner, mixed, rcond=1e-10)[0] / size[:, None]
+        root = prior_root(whole.robot)
+        information = total[:n, :n] - total[:n, n:] @ follow
+        values, vectors = np.linalg.eigh(root.T @ information @ root)
+        values = np.where(values > ROUNDING * values[-1], values, 0.0)
+        return cls(values, root @ vectors, vectors.T @ np.linalg.inv(root), follow)
+
+
+def _pulled(found: _Directions, share: Array, grams: Array, cross: Array) -> Array:
+    """Fits without each fold, of whose directions the data keeps the same shares."""
+    n, p = len(found.values), cross.shape[-1]
+    # In these coordinates the pull toward the URDF is diagonal.
+    change = block_diag(found.directions, np.eye(p - n))
+    pull = np.zeros(p)
+    floor = np.maximum(found.values, ROUNDING * max(found.values[-1], 1e-300))
+    pull[:n] = np.minimum((1 - share) / np.maximum(share, 1 / MOST_PULL), MOST_PULL) * floor
+    _, left = solve_left_out(
+        change.T @ grams @ change, cross @ change, (np.diag(pull), np.zeros(p))
+    )
+    return np.asarray(left @ change.T)
 
 
 def prior_root(robot: Robot) -> Array:

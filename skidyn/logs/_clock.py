@@ -138,28 +138,8 @@ def align_channels(
     if len(tables) == 1:
         assert rate is not None
         return _resampled(tables[0], rate, notes)
-    owner: dict[str, str] = {}
-    for table, name in zip(tables, names, strict=True):
-        for column in table.columns:
-            if column != "time" and owner.setdefault(column, name) != name:
-                raise LogError(
-                    f"{column} is in {owner[column]} and in {name}; choose one with "
-                    "topics=[...] (--topics on the command line)."
-                )
-        restarts = np.flatnonzero(np.diff(table["time"].to_numpy()) < 0)
-        if len(restarts):
-            raise LogError(
-                f"the clock of {name} goes back in row {restarts[0] + 1}: the corresponding rows "
-                "of the other channels cannot be determined. Store every run in a separate file."
-            )
-    begin = max(table["time"].min() for table in tables)
-    end = min(table["time"].max() for table in tables)
-    if not end > begin:
-        spans = ", ".join(
-            f"{name}: {t['time'].min():.3f}..{t['time'].max():.3f} s"
-            for t, name in zip(tables, names, strict=True)
-        )
-        raise LogError(f"the channels do not overlap in time ({spans}).")
+    _refuse_ambiguous(tables, names)
+    begin, end = _common_time(tables, names)
     if rate is not None:
         _refuse_too_fast(np.array([begin, end]), rate, sum(len(t.columns) for t in tables))
     base = next((k for k, table in enumerate(tables) if "q1" in table.columns), 0)
@@ -186,6 +166,37 @@ def align_channels(
     )
     joined: pd.DataFrame = pandas.concat(parts, axis=1)
     return joined
+
+
+def _refuse_ambiguous(tables: Sequence[pd.DataFrame], names: Sequence[str]) -> None:
+    """Refuse a signal that two channels have, and a clock that goes back."""
+    owner: dict[str, str] = {}
+    for table, name in zip(tables, names, strict=True):
+        for column in table.columns:
+            if column != "time" and owner.setdefault(column, name) != name:
+                raise LogError(
+                    f"{column} is in {owner[column]} and in {name}; choose one with "
+                    "topics=[...] (--topics on the command line)."
+                )
+        restarts = np.flatnonzero(np.diff(table["time"].to_numpy()) < 0)
+        if len(restarts):
+            raise LogError(
+                f"the clock of {name} goes back in row {restarts[0] + 1}: the corresponding rows "
+                "of the other channels cannot be determined. Store every run in a separate file."
+            )
+
+
+def _common_time(tables: Sequence[pd.DataFrame], names: Sequence[str]) -> tuple[Any, Any]:
+    """Begin and end of the time that all channels cover, s."""
+    begin = max(table["time"].min() for table in tables)
+    end = min(table["time"].max() for table in tables)
+    if not end > begin:
+        spans = ", ".join(
+            f"{name}: {t['time'].min():.3f}..{t['time'].max():.3f} s"
+            for t, name in zip(tables, names, strict=True)
+        )
+        raise LogError(f"the channels do not overlap in time ({spans}).")
+    return begin, end
 
 
 def _resampled(table: pd.DataFrame, rate: float, notes: list[str]) -> pd.DataFrame:

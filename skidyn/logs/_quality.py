@@ -265,22 +265,7 @@ def _measured(frame: pd.DataFrame, robot: Robot | None) -> tuple[Measurement, in
     """The measurement of a log, its number of trajectories, and sentences about omitted rows."""
     from skidyn.measurement import Measurement, count_same_stamps, regular_clock
 
-    if not hasattr(frame, "attrs"):  # of a DataFrame of pandas
-        given = repr(frame) if isinstance(frame, str) else type(frame).__name__
-        raise LogError(
-            f"check_log was given {given}; expected a DataFrame, as of read_log: "
-            "check_log(read_log('log.csv'))."
-        )
-    n = count_joints(frame)
-    if robot is not None and robot.n_joints != n:
-        raise LogError(
-            f"the log has {counted(n, 'joint')}, the robot has {robot.n_joints} "
-            f"({', '.join(robot.joint_names)}). If the log covers part of the robot, load it with "
-            "Robot.from_urdf(..., joints=[...])."
-        )
-    require_columns(frame, n, ("q", "dq", "tau"))
-    if "time" not in frame.columns:
-        raise LogError("the log has no time column.")
+    n = _checked_joints(frame, robot)
     blocks = {name: [f"{name}{k + 1}" for k in range(n)] for name in ("q", "dq", "ddq", "tau")}
     if not set(blocks["ddq"]) <= set(frame.columns):
         del blocks["ddq"]
@@ -319,6 +304,27 @@ def _measured(frame: pd.DataFrame, robot: Robot | None) -> tuple[Measurement, in
     if len(measurement.steps) == 0:
         raise LogError("every trajectory of the log has a single row and therefore no motion.")
     return measurement, len(np.unique(trajectory)), messages
+
+
+def _checked_joints(frame: pd.DataFrame, robot: Robot | None) -> int:
+    """Number of joints of a log that has all columns and matches the robot."""
+    if not hasattr(frame, "attrs"):  # of a DataFrame of pandas
+        given = repr(frame) if isinstance(frame, str) else type(frame).__name__
+        raise LogError(
+            f"check_log was given {given}; expected a DataFrame, as of read_log: "
+            "check_log(read_log('log.csv'))."
+        )
+    n = count_joints(frame)
+    if robot is not None and robot.n_joints != n:
+        raise LogError(
+            f"the log has {counted(n, 'joint')}, the robot has {robot.n_joints} "
+            f"({', '.join(robot.joint_names)}). If the log covers part of the robot, load it with "
+            "Robot.from_urdf(..., joints=[...])."
+        )
+    require_columns(frame, n, ("q", "dq", "tau"))
+    if "time" not in frame.columns:
+        raise LogError("the log has no time column.")
+    return n
 
 
 def _joints(measurement: Measurement) -> list[JointQuality]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,6 +15,7 @@ from skidyn._checks import warn_about_log
 from skidyn._exceptions import LogError
 from skidyn._progress import track
 from skidyn.logs._bounds import MAX_BYTES
+from skidyn.logs._files import Channel
 from skidyn.logs._folders import find_runs, read_runs
 from skidyn.logs._formats import decode
 from skidyn.logs._placeholders import Placeholder, refuse_absent
@@ -194,8 +195,6 @@ def read_log(
     ['time', 'trajectory', 'q1', 'dq1', 'tau1']
     >>> folder.cleanup()
     """
-    import pandas
-
     paths = _paths(path)
     _check_mapping("columns", columns, (str, int))
     _check_mapping("units", units, (str,))
@@ -232,15 +231,32 @@ def read_log(
         ),
         needs_torque,
     )
+    frame = _joined(paths, options, lambda file: decode(file, topics, max_bytes))
+    notes = said + frame.attrs["notes"]
+    refuse_absent(notes)
+    frame.attrs["notes"] = notes
+    if gravity is not None and robot is not None:
+        frame.attrs["gravity"] = robot.gravity.tolist()
+    for note in notes:
+        warn_about_log(note)
+    if check and "tau1" in frame:
+        _warn_about_quality(frame, robot)
+    return frame
+
+
+def _joined(
+    paths: Sequence[PathLike], options: TableOptions, channels_of: Callable[[Path], list[Channel]]
+) -> pd.DataFrame:
+    """The recordings at all paths as one table; ``attrs`` has its joints, files and notes."""
+    import pandas
+
     tables: list[pd.DataFrame] = []
     files: list[str] = []
     notes: list[str] = []
     joints: list[str] = []
     found = [run for item in paths for run in find_runs(item)]
     recordings = (
-        recording
-        for run in track(found, "Reading")
-        for recording in read_runs(run, lambda file: decode(file, topics, max_bytes))
+        recording for run in track(found, "Reading") for recording in read_runs(run, channels_of)
     )
     for name, channels in recordings:
         file = Path(name)
@@ -255,20 +271,17 @@ def read_log(
         files += [str(file)] * (int(number.max()) + 1)
         tables.append(table)
     frame = pandas.concat(tables, ignore_index=True) if len(tables) > 1 else tables[0]
-    notes = said + _told_once(notes, len(tables))
-    refuse_absent(notes)
+    notes = _told_once(notes, len(tables))
     frame.attrs = {"joint_names": joints, "files": files, "notes": notes}
-    if gravity is not None and robot is not None:
-        frame.attrs["gravity"] = robot.gravity.tolist()
-    for note in notes:
-        warn_about_log(note)
-    if check and "tau1" in frame:
-        quality = check_log(frame, robot)
-        # wrong bodies of the description are not an error of the log; diagnose reports them
-        told = [str(check) for check in quality.checks if check.check != "bodies"]
-        for message in (*quality.faults, *told):
-            warn_about_log(message)
     return frame
+
+
+def _warn_about_quality(frame: pd.DataFrame, robot: Robot | None) -> None:
+    quality = check_log(frame, robot)
+    # wrong bodies of the description are not an error of the log; diagnose reports them
+    told = [str(check) for check in quality.checks if check.check != "bodies"]
+    for message in (*quality.faults, *told):
+        warn_about_log(message)
 
 
 def _paths(path: Any) -> list[PathLike]:

@@ -256,28 +256,9 @@ def _clean(
         raise LogError(f"{source} has {len(table)} row(s); a log needs at least two.")
     time = table["time"].to_numpy()
     if own_trajectories:
-        number = table["trajectory"].to_numpy()
-        if np.any(number != np.round(number)):
-            raise LogError(f"{source}: the trajectory column must hold whole numbers.")
-        if len(number) and np.abs(number).max() > LARGEST_NUMBER:
-            raise LogError(
-                f"{source}: the trajectory column holds {number[np.abs(number).argmax()]:g}; only "
-                f"numbers up to {LARGEST_NUMBER} are distinct. Number the trajectories from 1."
-            )
-        number = number.astype(np.int64)
+        number = _own_numbers(table["trajectory"].to_numpy(), source)
     else:
-        number, restarts = split_at_restarts(time)
-        number += 1  # as files and joints are counted
-        if restarts > len(time) / 2:
-            raise LogError(
-                f"{source}: time goes back in {restarts} of {len(time) - 1} steps (from "
-                f"{time[0]:.6g} to {time[-1]:.6g}): the rows are in reverse order. Sort them by "
-                "time."
-            )
-        if restarts:
-            match.notes.append(
-                f"{source}: the clock restarts {restarts} time(s); each run becomes a trajectory"
-            )
+        number = _numbers_of_runs(time, match.notes, source)
     table["trajectory"] = number
     keep = check_time_order(time, number, source)
     if not keep.all() and not _same_stamps(table, n, number, source, options):
@@ -299,6 +280,35 @@ def _clean(
         match.notes.append(f"{source}: no velocities recorded; derived by central differences of q")
     require_columns(table, n, ("dq", *options.needed), source)
     return table
+
+
+def _own_numbers(number: np.ndarray, source: str) -> np.ndarray:
+    """Trajectory numbers that the log has, as integers."""
+    if np.any(number != np.round(number)):
+        raise LogError(f"{source}: the trajectory column must hold whole numbers.")
+    if len(number) and np.abs(number).max() > LARGEST_NUMBER:
+        raise LogError(
+            f"{source}: the trajectory column holds {number[np.abs(number).argmax()]:g}; only "
+            f"numbers up to {LARGEST_NUMBER} are distinct. Number the trajectories from 1."
+        )
+    return number.astype(np.int64)
+
+
+def _numbers_of_runs(time: np.ndarray, notes: list[str], source: str) -> np.ndarray:
+    """Trajectory numbers by the restarts of the clock."""
+    number, restarts = split_at_restarts(time)
+    number += 1  # as files and joints are counted
+    if restarts > len(time) / 2:
+        raise LogError(
+            f"{source}: time goes back in {restarts} of {len(time) - 1} steps (from "
+            f"{time[0]:.6g} to {time[-1]:.6g}): the rows are in reverse order. Sort them by "
+            "time."
+        )
+    if restarts:
+        notes.append(
+            f"{source}: the clock restarts {restarts} time(s); each run becomes a trajectory"
+        )
+    return number
 
 
 def _same_stamps(

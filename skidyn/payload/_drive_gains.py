@@ -239,18 +239,6 @@ def _estimate(runs: Runs, robot: Robot, known: Array, nominal: Array) -> DriveGa
     is_open = open_columns(system.linearised(whole, noise, solution)[1], place)
     gains, std = np.where(is_open, np.nan, gains), np.where(is_open, np.nan, std)
     half = interval_factor(len(factors)) * std[:, None] * [-1.0, 1.0]
-    notes = [
-        f"All gains are proportional to the mass of {known[0]:g} kg: if it is 1 % too large, so "
-        "are they. Friction and all inertial parameters scale with them."
-    ]
-    hardly = is_open | (np.abs(half[:, 1]) >= np.abs(gains))
-    if hardly.any():
-        names = ", ".join(np.array(robot.joint_names)[hardly])
-        notes.append(
-            f"These runs contain little information about the gain of {names}, whose current "
-            "hardly depends on the load. Record motion in which that joint turns the load out of "
-            "balance."
-        )
 
     def expected(left_out: NDArray[np.int64]) -> list[Array]:
         kept = [parts for f, parts in enumerate(factors) if f not in left_out]
@@ -259,6 +247,7 @@ def _estimate(runs: Runs, robot: Robot, known: Array, nominal: Array) -> DriveGa
         return [own * (r[:, :-2] @ x + r[:, -2]) for own, r in zip(k, rows, strict=True)]
 
     currents_over = compare_recordings(runs, expected)
+    notes = _notes(known[0], robot, is_open | (np.abs(half[:, 1]) >= np.abs(gains)))
     notes += differing(currents_over, robot.joint_names)
     body = known.copy()
     body[system.unknown] = solution[: len(system.unknown)]
@@ -279,6 +268,22 @@ def _estimate(runs: Runs, robot: Robot, known: Array, nominal: Array) -> DriveGa
         relative_error=noise / currents,
         notes=tuple(notes),
     )
+
+
+def _notes(mass: float, robot: Robot, hardly: NDArray[np.bool_]) -> list[str]:
+    """On what all gains depend, and joints whose current hardly depends on the load."""
+    notes = [
+        f"All gains are proportional to the mass of {mass:g} kg: if it is 1 % too large, so "
+        "are they. Friction and all inertial parameters scale with them."
+    ]
+    if hardly.any():
+        names = ", ".join(np.array(robot.joint_names)[hardly])
+        notes.append(
+            f"These runs contain little information about the gain of {names}, whose current "
+            "hardly depends on the load. Record motion in which that joint turns the load out of "
+            "balance."
+        )
+    return notes
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from skidyn._text import digits
 from skidyn.evidence import jackknife, linear_terms, without_each
 from skidyn.identification import RBDRegressor, make_consistent
 from skidyn.payload._by_recording import Shares, compare_recordings, differing
+from skidyn.payload._payload_fit import PayloadFit, solve_rows
 from skidyn.payload._runs import (
     FRICTION,
     SYMBOLS,
@@ -34,8 +35,6 @@ CONFOUNDED = (
     "large. Only a known load separates them: skidyn payload --known-mass (in Python: "
     "estimate_drive_gains)."
 )
-#: Number of times that the noise of the joints is estimated and the fit repeated.
-PASSES = 3
 #: Difference of a joint's own estimate from the common one, in standard errors, beyond which a
 #: contradiction is reported, and standard error, as a share, beyond which a joint is too imprecise
 #: for it.
@@ -327,74 +326,59 @@ def _prediction(model: Robot | RBDRegressor, loaded: Any) -> Array:
 
 
 def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None) -> PayloadEstimate:
-    # Parameters of the body from the free ones: with a known centre of mass one number determines
-    # mass and first moment.
-    free = np.eye(10)
-    if com is not None:
-        free = np.delete(free, [1, 2, 3], axis=1)
-        free[1:4, 0] = com
-    bodies = [body @ free for body in runs.body]
-    designs = [np.hstack(pair) for pair in zip(bodies, runs.rest, strict=True)]
-    noise = np.ones(len(designs))
-    for _ in range(PASSES):
-        factors = _fold_factors(designs, runs, noise)
-        solution = _solve(np.vstack(factors))
-        noise = _noise(designs, runs.target, solution)
-    factors = _fold_factors(designs, runs, noise)
-    whole = triangle(np.vstack(factors))
-    width = free.shape[1]
-    hidden = open_columns(whole[:, :-1], range(width))
-    is_open: NDArray[np.bool_] = np.any(np.abs(free[:, hidden]) > 0, axis=1)
-    if is_open[:4].all():
+    fit = PayloadFit.of(runs, com)
+    if fit.is_open[:4].all():
         raise SkidynError(
             f"this motion shows neither mass nor first moment of a payload at {link}: no torque "
             "depends on them, or they cannot be separated from those of the robot. Turn the "
             "payload about a joint whose axis is not vertical, with and without the load."
         )
-    left = np.array([_solve(rows) for rows in without_each(factors)])[:, :width] @ free.T
-    std = jackknife(left)
-    std[is_open] = np.nan
-    wide = interval_factor(len(factors))
-    body = free @ solution[:width]
-    first_moment = np.where(is_open[1:4], np.nan, body[1:4])
-    moments = first_moment[:, None] + wide * std[1:4, None] * [-1.0, 1.0]
-    shares, share_std = _by_joint(runs, body)
+    std = jackknife(fit.left_out)
+    std[fit.is_open] = np.nan
+    wide = interval_factor(len(fit.factors))
+    first_moment = np.where(fit.is_open[1:4], np.nan, fit.body[1:4])
+    shares, share_std = _by_joint(runs, fit.body)
     robot = runs.problem.robot
     assert robot is not None
-
-    def expected(left_out: NDArray[np.int64]) -> list[Array]:
-        kept = [rows for f, rows in enumerate(factors) if f not in left_out]
-        others = _solve(np.vstack(kept))
-        return [design @ others for design in designs]
-
-    recordings = compare_recordings(runs, expected)
+    recordings = compare_recordings(runs, fit.expected)
     notes = notes + _disagreement(shares, share_std) + differing(recordings, robot.joint_names)
-    before, after = _loaded_errors(designs, runs, solution, width)
-    common: dict[str, Any] = {
-        "std": std,
-        "link": link,
-        "rmse_before": before,
-        "rmse_after": after,
-        "first_moment": first_moment,
-        "first_moment_interval": moments,
-        "by_joint": shares,
-        "by_joint_std": share_std,
-        "by_recording": recordings,
-        "joint_names": tuple(robot.joint_names),
-        "units": tuple("N" if slides else "N m" for slides in runs.problem.signals.prismatic),
+    before, after = _loaded_errors(fit, runs)
+    own = _first_moment_only(fit) if fit.is_open[0] else _whole_body(fit, com, std, wide, notes)
+    return PayloadEstimate(
+        **own,
+        std=std,
+        link=link,
+        rmse_before=before,
+        rmse_after=after,
+        notes=tuple(notes),
+        first_moment=first_moment,
+        first_moment_interval=first_moment[:, None] + wide * std[1:4, None] * [-1.0, 1.0],
+        by_joint=shares,
+        by_joint_std=share_std,
+        by_recording=recordings,
+        joint_names=tuple(robot.joint_names),
+        units=tuple("N" if slides else "N m" for slides in runs.problem.signals.prismatic),
+    )
+
+
+def _first_moment_only(fit: PayloadFit) -> dict[str, Any]:
+    """Attributes of a payload whose mass the motion does not determine."""
+    nothing = np.full((3, 3), np.nan)
+    return {
+        "mass": np.nan,
+        "com": nothing[0],
+        "inertia": nothing,
+        "mass_interval": (np.nan, np.nan),
+        "com_interval": nothing[:, :2],
+        "inertial_parameters": np.where(fit.is_open, np.nan, fit.body),
     }
-    if is_open[0]:
-        nothing = np.full((3, 3), np.nan)
-        return PayloadEstimate(
-            mass=np.nan,
-            com=nothing[0],
-            inertia=nothing,
-            mass_interval=(np.nan, np.nan),
-            com_interval=nothing[:, :2],
-            inertial_parameters=np.where(is_open, np.nan, body),
-            notes=tuple(notes),
-            **common,
-        )
+
+
+def _whole_body(
+    fit: PayloadFit, com: Array | None, std: Array, wide: float, notes: list[str]
+) -> dict[str, Any]:
+    """Attributes of a payload with a mass; what is not measured about it is appended to notes."""
+    is_open, body, left = fit.is_open, fit.body, fit.left_out
     if is_open.any():
         names = ", ".join(np.array(SYMBOLS)[is_open])
         notes.append(
@@ -404,7 +388,7 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
         notes.append("The centre of mass is the given one; the mass depends on it.")
         parameters = _sphere(body[0], com) if is_open[4:].any() else body
     else:
-        parameters = _consistent(whole, solution[:10], is_open)
+        parameters = _consistent(fit.whole, fit.solution[:10], is_open)
     about = _about_com(parameters)
     mass, first = parameters[0], parameters[1:4]
     least = wide * float(np.max(std[[4, 7, 9]]))  # of Ixx, Iyy, Izz; NaN if one is undetermined
@@ -416,16 +400,14 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
     com_std = jackknife(left[:, 1:4] / left[:, :1])
     com_std[is_open[1:4]] = np.inf
     half = wide * com_std[:, None] * [-1.0, 1.0]
-    return PayloadEstimate(
-        mass=float(mass),
-        com=first / mass,
-        inertia=about,
-        mass_interval=(float(mass - wide * std[0]), float(mass + wide * std[0])),
-        com_interval=(first / mass)[:, None] + half,
-        inertial_parameters=parameters,
-        notes=tuple(notes),
-        **common,
-    )
+    return {
+        "mass": float(mass),
+        "com": first / mass,
+        "inertia": about,
+        "mass_interval": (float(mass - wide * std[0]), float(mass + wide * std[0])),
+        "com_interval": (first / mass)[:, None] + half,
+        "inertial_parameters": parameters,
+    }
 
 
 def _sphere(mass: float, com: Array) -> Array:
@@ -447,8 +429,8 @@ def _by_joint(runs: Runs, body: Array) -> tuple[Array, Array]:
             shares.append(np.nan)
             errors.append(np.nan)
             continue
-        shares.append(_solve(whole)[0])
-        errors.append(float(jackknife(np.array([_solve(r)[0] for r in without_each(parts)]))))
+        shares.append(solve_rows(whole)[0])
+        errors.append(float(jackknife(np.array([solve_rows(r)[0] for r in without_each(parts)]))))
     return np.array(shares), np.array(errors)
 
 
@@ -475,31 +457,6 @@ def _disagreement(shares: Array, errors: Array) -> list[str]:
     ]
 
 
-def _fold_factors(designs: list[Array], runs: Runs, noise: Array) -> list[Array]:
-    """Triangular factor of [columns | torque] of every fold, joints weighted by their noise."""
-    factors = []
-    for f in range(runs.n_folds):
-        parts = [
-            np.column_stack([design, target])[fold == f] / s
-            for design, target, fold, s in zip(designs, runs.target, runs.fold, noise, strict=True)
-        ]
-        factors.append(triangle(np.vstack(parts)))
-    return factors
-
-
-def _solve(factor: Array) -> Array:
-    """Least squares, with the smallest solution for dependent columns."""
-    columns, target = factor[:, :-1], factor[:, -1]
-    size = np.linalg.norm(columns, axis=0)
-    size[size == 0] = 1.0
-    return np.asarray(np.linalg.lstsq(columns / size, target, rcond=1e-9)[0] / size)
-
-
-def _noise(designs: list[Array], targets: list[Array], solution: Array) -> Array:
-    pairs = zip(designs, targets, strict=True)
-    return np.array([np.sqrt(np.mean((y - a @ solution) ** 2)) + 1e-100 for a, y in pairs])
-
-
 def _consistent(whole: Array, free: Array, is_open: NDArray[np.bool_]) -> Array:
     """The possible body that explains the torque best, with all other parameters fitted again."""
     if free[0] > 0:
@@ -523,15 +480,13 @@ def _about_com(parameters: Array) -> Array:
     return np.asarray(about_origin - mass * (com @ com * np.eye(3) - np.outer(com, com)))
 
 
-def _loaded_errors(
-    designs: list[Array], runs: Runs, solution: Array, width: int = 10
-) -> tuple[Array, Array]:
+def _loaded_errors(fit: PayloadFit, runs: Runs) -> tuple[Array, Array]:
     """Errors on the rows with the payload, without it and with it in the model."""
-    errors = []
-    for design, target, body in zip(designs, runs.target, runs.body, strict=True):
+    errors, width = [], fit.width
+    for design, target, body in zip(fit.designs, runs.target, runs.body, strict=True):
         felt = np.any(body != 0, axis=1)
-        residual = (target - design @ solution)[felt]
-        payload = design[felt, :width] @ solution[:width]
+        residual = (target - design @ fit.solution)[felt]
+        payload = design[felt, :width] @ fit.solution[:width]
         errors.append(
             [np.sqrt(np.mean(x**2)) if felt.any() else 0.0 for x in (residual + payload, residual)]
         )

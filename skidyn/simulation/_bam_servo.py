@@ -230,28 +230,8 @@ def _read(robot: Robot, log: Any, gain: Any, volts: Any, step: float) -> _Bench:
         raise SkidynError(
             "a servo is fitted on a robot with one revolute joint, as on BAM's test bench"
         )
-    names = column_names(log)
-    lost = [name for name in ("time", "q1", "q_ref1") if name not in (names or [])]
-    if lost:
-        raise SkidynError(f"the log lacks the column(s) {', '.join(lost)}")
-    assert names is not None
-    table: dict[str, Array] = {
-        name: np.asarray(log[name], dtype=float)
-        for name in ("time", "q1", "dq1", "q_ref1", "enabled", "trajectory")
-        if name in names
-    }
-    n = len(table["time"])
-    for key, value in (("gain", gain), ("volts", volts)):
-        column = np.asarray(value, dtype=float)
-        if column.shape not in ((), (n,)) or not np.isfinite(column).all():
-            raise SkidynError(f"{key} is to be a number, or one for each of the {n} samples")
-        table[key] = np.broadcast_to(column, (n,))
-    broken = [k for k, v in table.items() if not np.isfinite(v).all()]
-    if broken:
-        raise SkidynError(
-            f"the column {broken[0]!r} has entries that are not numbers; leave them out"
-        )
-    number = table.get("trajectory", np.zeros(n))
+    table = _columns(log, gain, volts)
+    number = table.get("trajectory", np.zeros(len(table["time"])))
     rows, parts = [], []
     for own in (np.flatnonzero(number == k) for k in np.unique(number)):
         time = table["time"][own] - table["time"][own][0]
@@ -260,15 +240,7 @@ def _read(robot: Robot, log: Any, gain: Any, volts: Any, step: float) -> _Bench:
                 f"recording {number[own[0]]:g} is too short, or its time does not grow"
             )
         rows.append((own, time))
-        clock = np.arange(0.0, time[-1], step)
-        part: dict[str, Array] = {k: np.interp(clock, time, v[own]) for k, v in table.items()}
-        # On or off is that of the sample before.
-        past = np.searchsorted(time, clock, side="right") - 1
-        on = table.get("enabled", np.ones(n))[own][past] > 0.5
-        part["enabled"] = on.astype(float)
-        speed = table["dq1"][own] if "dq1" in table else np.gradient(table["q1"][own], time)
-        part["speed"] = np.full(len(clock), speed[0])
-        parts.append(part)
+        parts.append(_on_clock({k: v[own] for k, v in table.items()}, time, step))
     longest = max(len(part["q1"]) for part in parts)
 
     def together(key: str) -> Array:
@@ -293,6 +265,45 @@ def _read(robot: Robot, log: Any, gain: Any, volts: Any, step: float) -> _Bench:
         gravity=(float(weight[1]), float(weight[0])),
         rows=rows,
     )
+
+
+def _columns(log: Any, gain: Any, volts: Any) -> dict[str, Array]:
+    """Columns of a log, with gain and voltage, all of them finite numbers."""
+    names = column_names(log)
+    lost = [name for name in ("time", "q1", "q_ref1") if name not in (names or [])]
+    if lost:
+        raise SkidynError(f"the log lacks the column(s) {', '.join(lost)}")
+    assert names is not None
+    table: dict[str, Array] = {
+        name: np.asarray(log[name], dtype=float)
+        for name in ("time", "q1", "dq1", "q_ref1", "enabled", "trajectory")
+        if name in names
+    }
+    n = len(table["time"])
+    for key, value in (("gain", gain), ("volts", volts)):
+        column = np.asarray(value, dtype=float)
+        if column.shape not in ((), (n,)) or not np.isfinite(column).all():
+            raise SkidynError(f"{key} is to be a number, or one for each of the {n} samples")
+        table[key] = np.broadcast_to(column, (n,))
+    broken = [k for k, v in table.items() if not np.isfinite(v).all()]
+    if broken:
+        raise SkidynError(
+            f"the column {broken[0]!r} has entries that are not numbers; leave them out"
+        )
+    return table
+
+
+def _on_clock(table: Mapping[str, Array], time: Array, step: float) -> dict[str, Array]:
+    """Columns of a recording at even steps, ``speed`` the one at its beginning."""
+    clock = np.arange(0.0, time[-1], step)
+    part: dict[str, Array] = {k: np.interp(clock, time, v) for k, v in table.items()}
+    # On or off is that of the sample before.
+    past = np.searchsorted(time, clock, side="right") - 1
+    on = table.get("enabled", np.ones(len(time)))[past] > 0.5
+    part["enabled"] = on.astype(float)
+    speed = table["dq1"] if "dq1" in table else np.gradient(table["q1"], time)
+    part["speed"] = np.full(len(clock), speed[0])
+    return part
 
 
 def _run(bench: _Bench, name: str, values: Mapping[str, Array]) -> tuple[Array, Array]:

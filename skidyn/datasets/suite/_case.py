@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from skidyn.datasets.suite._friction import FRICTION
-from skidyn.datasets.suite._hidden import Setting
+from skidyn.datasets.suite._hidden import Hidden, Setting
 from skidyn.datasets.suite._measurement import MEASUREMENT
 from skidyn.datasets.suite._motion import Motion, plan
 from skidyn.datasets.suite._nameless import NAMELESS
@@ -55,19 +55,9 @@ def simulate(case: SuiteCase) -> tuple[dict[str, Any], dict[str, Any], dict[str,
     motion_rng, robot_rng, effect_rng, sensor_rng = np.random.default_rng([*case.entropy, 1]).spawn(
         4
     )
-    drives = DRIVES[case.robot]
-    n = drives.n_joints
-    short = case.tier == "short"
-    rates = [FAST[k] for k in case.kinds if k in FAST] or [RATES]
-    both = sorted(set(rates[0]).intersection(*rates)) or [max(rates[0])]
-    rate = int(sensor_rng.choice(both))
-    duration = (SHORT_SECONDS if short else SECONDS)[rate]
-    paces = list(SHORT_PACES if short else PACES * 2)
-    if not short and motion_rng.random() < 0.3:
-        paces[2] = paces[-1] = "points"
-    motions = [
-        plan(paces[i], drives, duration, motion_rng) for i in motion_rng.permutation(len(paces))
-    ]
+    rate = _rate(case.kinds, sensor_rng)
+    duration = (SHORT_SECONDS if case.tier == "short" else SECONDS)[rate]
+    motions = _motions(case, duration, motion_rng)
     strengths, noise = TIERS[case.tier]
     setting = _setting(case.robot, motions, duration, effect_rng.uniform(*strengths), effect_rng)
     makers = NAMED
@@ -83,19 +73,7 @@ def simulate(case: SuiteCase) -> tuple[dict[str, Any], dict[str, Any], dict[str,
     recordings = record_all(
         Robotics(case.robot, values, bodies), setting, hidden, motions, robot_rng
     )
-    rough = case.tier == "rough"
-    warm = any(item.needs_temperature for item in hidden)
-    hides_warmth = any(item.kind == "friction_drift" for item in hidden)
-    sensors = Sensors(
-        rate=rate,
-        noise="high" if short and sensor_rng.random() < 0.5 else noise,
-        irregular=bool(sensor_rng.random() < (0.6 if rough else 0.1)),
-        jitter=float(sensor_rng.uniform(5e-5, 3e-4)) if rough else 0.0,
-        bits=int(sensor_rng.choice([13, 14, 15] if rough else [17, 18, 19, 20])),
-        velocity=str(sensor_rng.choice(["measured", "differences"])),
-        acceleration=bool(sensor_rng.random() < 0.12),
-        temperature=(warm or bool(sensor_rng.random() < 0.2)) and not hides_warmth,
-    )
+    sensors = _sensors(case.tier, rate, noise, hidden, sensor_rng)
     delay = {j: lag for item in hidden for j, lag in item.delay.items()}
     rows = sample(recordings, sensors, delay, sensor_rng)
     for item in hidden:
@@ -110,7 +88,7 @@ def simulate(case: SuiteCase) -> tuple[dict[str, Any], dict[str, Any], dict[str,
     meta = {
         "case": case.name,
         "robot": case.robot,
-        "dof": n,
+        "dof": DRIVES[case.robot].n_joints,
         "joint_types": ["prismatic" if s else "revolute" for s in setting.sliders],
         "base_model": base,
         "nominal_rate_hz": rate,
@@ -122,6 +100,41 @@ def simulate(case: SuiteCase) -> tuple[dict[str, Any], dict[str, Any], dict[str,
     truth |= {"sensors": asdict(sensors), "n_rows": len(rows["q"])}
     truth |= truth_of(hidden, left, noise_std, len(rows["q"]), sensors)
     return columns, meta, truth
+
+
+def _rate(kinds: Sequence[str], rng: np.random.Generator) -> int:
+    """A rate in Hz at which the log can show all kinds of effects."""
+    rates = [FAST[k] for k in kinds if k in FAST] or [RATES]
+    both = sorted(set(rates[0]).intersection(*rates)) or [max(rates[0])]
+    return int(rng.choice(both))
+
+
+def _motions(case: SuiteCase, duration: float, rng: np.random.Generator) -> list[Motion]:
+    """Motions of the usual paces, in a random order."""
+    short = case.tier == "short"
+    paces = list(SHORT_PACES if short else PACES * 2)
+    if not short and rng.random() < 0.3:
+        paces[2] = paces[-1] = "points"
+    drives = DRIVES[case.robot]
+    return [plan(paces[i], drives, duration, rng) for i in rng.permutation(len(paces))]
+
+
+def _sensors(
+    tier: str, rate: int, noise: str, hidden: Sequence[Hidden], rng: np.random.Generator
+) -> Sensors:
+    short, rough = tier == "short", tier == "rough"
+    warm = any(item.needs_temperature for item in hidden)
+    hides_warmth = any(item.kind == "friction_drift" for item in hidden)
+    return Sensors(
+        rate=rate,
+        noise="high" if short and rng.random() < 0.5 else noise,
+        irregular=bool(rng.random() < (0.6 if rough else 0.1)),
+        jitter=float(rng.uniform(5e-5, 3e-4)) if rough else 0.0,
+        bits=int(rng.choice([13, 14, 15] if rough else [17, 18, 19, 20])),
+        velocity=str(rng.choice(["measured", "differences"])),
+        acceleration=bool(rng.random() < 0.12),
+        temperature=(warm or bool(rng.random() < 0.2)) and not hides_warmth,
+    )
 
 
 def _setting(
