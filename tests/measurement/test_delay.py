@@ -49,11 +49,11 @@ def test_clocks_of_other_rates():
 
 
 def test_one_recording_that_is_late():
-    run = int(FRAME["trajectory"].unique()[3])
-    own = FRAME["trajectory"] == run
-    frame = FRAME.copy()
+    frame = make_hidden_effect_log(ROBOT, None, duration=8.0, random_state=0).frame
+    run = int(frame["trajectory"].unique()[3])
+    own = frame["trajectory"] == run
     for name in TORQUES:
-        frame.loc[own, name] = FRAME.loc[own, name].shift(3).bfill()
+        frame.loc[own, name] = frame.loc[own, name].shift(3).bfill()
     (told,) = [s for s in check_log(frame, ROBOT).checks if s.check == "torque_delay"]
     words = told.suspicion.split(" ")
     assert told.suspicion.startswith(f"in trajectory {run} torque is late by about ")

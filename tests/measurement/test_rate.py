@@ -29,7 +29,7 @@ def test_a_rate_that_is_wrong_in_clock_and_velocities(factor, told_of):
 @pytest.mark.parametrize(
     ("factor", "log"),
     [
-        (0.5, {"n_trajectories": 6, "duration": 8.0, "random_state": 8}),
+        (0.5, {"n_trajectories": 6, "duration": 8.0, "random_state": 23}),
         (2.0, {"n_trajectories": 5, "duration": 6.0, "random_state": 7319358}),
     ],
 )
