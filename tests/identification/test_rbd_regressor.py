@@ -202,29 +202,6 @@ def test_intervals_cover_the_truth(exact):
     assert np.mean(inside) > 0.85
 
 
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"consistent": "yes"}, "True, False or BodyConstraints"),
-        ({"smooth": "x"}, "True, False or None"),
-        ({"forgetting": "a"}, "expected a number"),
-        ({"forgetting": True}, "expected a number"),
-        ({"horizon": "x"}, "expected a number or None"),
-        ({"estimator": ["ridge"]}, "expected one of 'weighted'"),
-        ({"effects": "viscous"}, r"effects=\['viscous'\]"),
-        ({"effects": None}, "expected a list"),
-        ({"effects": [3]}, "3 is not an effect"),
-        ({"effects": [("viscous", ["a"])]}, "joints counted from 1"),
-        ({"effects": [("viscous", [0])]}, "no joint 0; the robot has joints 1 to"),
-        ({"robot": 5}, "5 describes no robot"),
-    ],
-)
-def test_parameters_of_another_kind_are_refused(exact, wrong, message):
-    robot, _, X, y = exact
-    with pytest.raises(ValueError, match=message):
-        RBDRegressor(**({"robot": robot} | wrong)).fit(X, y)
-
-
 def swings(amplitudes, speeds, centres):
     """A pendulum with friction that depends on its position, one recording an amplitude."""
     robot, t, frames = Robot.from_urdf(ONE_JOINT), np.arange(400) * 0.01, []
