@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -234,77 +234,89 @@ def make_finding(
     unknowns : sequence of UnknownTorque, default=()
         Results for unknown terms.
     """
-    term = candidate.term
-    effect, unknown = term.effect, hypothesis.kind == UNKNOWN
+    term, effect = candidate.term, candidate.term.effect
     compared = least_sure(hypothesis, candidate.joints)
     rivals = tuple(dict.fromkeys([*rivals_of(hypothesis), *rivals_of(compared)]))
     joints = _joints(problem, hypothesis, candidate)
-    parameters = {} if unknown else _parameters(problem, candidate, intervals)
+    unknown = hypothesis.kind == UNKNOWN
     tested = tuple(sorted({v for u in unknowns for v in u.variables}))
-    variables = tested or candidate.variables
-    title = effect.title
-    if unknown:
-        own = effect.words(term.shape) if isinstance(effect, NamelessEffect) else ""
-        title = own or f"Unknown torque that depends on {listed(variables)}"
-    relatives = [k for k in rivals if k != UNKNOWN and get_effect(k).family == effect.family]
-    if effect.family and relatives:
-        title = f"{effect.family.capitalize()}, best described by {title}"
-    formulas = [u for u in unknowns if u.proposal is not None]
-    if formulas:
-        code = f'model = diagnosis.add("formula", joints={[u.joint for u in formulas]})'
-    elif term.trajectories is not None or term.course:
-        code = "model = diagnosis.model"
-    else:
-        code = f'model = diagnosis.add("{hypothesis.kind}", joints={list(joints)})'
     # None as well for what acts in every recording, with a size of its own
     some = term.trajectories
     some = None if some is not None and len(some) == len(problem.rows.recordings) else some
-    sentence = f"{told_briefly(title, joints, some, parameters)}. "
-    sentence += f"It {spans_told(term.spans)}. " if term.spans else ""
-    sentence += f"It {course_told(term)}. " if term.course else ""
-    sentence += _fall_told(error_drop, averaged_drop)
-    if rivals:
-        sentence += (
-            f" This data cannot separate it from {listed([rival_title(k) for k in rivals], 'or')}"
-            + f"; a recording with {effect.separating_motion} would"
-            * bool(effect.separating_motion)
-            + "."
-        )
-    elsewhere = tuple(tuple(j + 1 for j in site) for site in hypothesis.elsewhere)
-    if elsewhere:
-        sentence += f" It would explain the data equally well on {sites_told(elsewhere)}."
-    nearest = nearest_of(problem, hypothesis)
-    if nearest:
-        sentence += (
-            f" Of the known effects, {rival_title(nearest['kind'])} comes closest: alone, it "
-            f"removes {nearest['share']:.0%} of the error that this torque removes."
-        )
-    for u in formulas:
-        assert u.proposal is not None
-        sentence += f" An equivalent formula for joint {u.joint}: {u.proposal.text}."
-    sentence = " ".join([sentence, *notes(hypothesis.kind, parameters)])
-    return Finding(
+    formulas = {u.joint: u.proposal for u in unknowns if u.proposal is not None}
+    finding = Finding(
         hypothesis.kind,
-        title,
+        _title(candidate, unknown, tested or candidate.variables, rivals),
         joints,
-        parameters,
-        variables,
+        {} if unknown else _parameters(problem, candidate, intervals),
+        tested or candidate.variables,
         error_drop,
         q_value,
         rivals,
         effect.separating_motion,
-        sentence,
-        code,
+        "",
+        _code(hypothesis.kind, term, joints, list(formulas)),
         (term,),
         compared.margin,
         None,
         some,
         alike=hypothesis.alike,
-        elsewhere=elsewhere,
-        nearest=nearest,
+        elsewhere=tuple(tuple(j + 1 for j in site) for site in hypothesis.elsewhere),
+        nearest=nearest_of(problem, hypothesis),
         lead=compared.margin * compared.score,
         averaged_drop=averaged_drop,
     )
+    texts = {joint: proposal.text for joint, proposal in formulas.items()}
+    return replace(finding, sentence=_sentence(finding, texts))
+
+
+def _title(
+    candidate: Candidate, unknown: bool, variables: Sequence[str], rivals: Sequence[str]
+) -> str:
+    """Name of an effect with its family, or of an unknown torque by its signals."""
+    effect, title = candidate.term.effect, candidate.term.effect.title
+    if unknown:
+        own = effect.words(candidate.term.shape) if isinstance(effect, NamelessEffect) else ""
+        title = own or f"Unknown torque that depends on {listed(variables)}"
+    relatives = [k for k in rivals if k != UNKNOWN and get_effect(k).family == effect.family]
+    if effect.family and relatives:
+        return f"{effect.family.capitalize()}, best described by {title}"
+    return title
+
+
+def _code(kind: str, term: Term, joints: Sequence[int], with_formula: Sequence[int]) -> str:
+    """Line of Python that completes the model with a finding."""
+    if with_formula:
+        return f'model = diagnosis.add("formula", joints={list(with_formula)})'
+    if term.trajectories is not None or term.course:
+        return "model = diagnosis.model"
+    return f'model = diagnosis.add("{kind}", joints={list(joints)})'
+
+
+def _sentence(finding: Finding, formulas: Mapping[int, str]) -> str:
+    """What is said of a finding; ``formulas`` are equivalent ones by joint."""
+    (term,) = finding.terms
+    told = told_briefly(finding.title, finding.joints, finding.trajectories, finding.parameters)
+    sentence = f"{told}. "
+    sentence += f"It {spans_told(term.spans)}. " if term.spans else ""
+    sentence += f"It {course_told(term)}. " if term.course else ""
+    sentence += _fall_told(finding.error_drop, finding.averaged_drop)
+    if finding.rivals:
+        motion = finding.separating_motion
+        rivals = listed([rival_title(k) for k in finding.rivals], "or")
+        would = f"; a recording with {motion} would" if motion else ""
+        sentence += f" This data cannot separate it from {rivals}{would}."
+    if finding.elsewhere:
+        sites = sites_told(finding.elsewhere)
+        sentence += f" It would explain the data equally well on {sites}."
+    if finding.nearest:
+        sentence += (
+            f" Of the known effects, {rival_title(finding.nearest['kind'])} comes closest: alone, "
+            f"it removes {finding.nearest['share']:.0%} of the error that this torque removes."
+        )
+    for joint, text in formulas.items():
+        sentence += f" An equivalent formula for joint {joint}: {text}."
+    return " ".join([sentence, *notes(finding.kind, finding.parameters)])
 
 
 def sites_told(sites: Sequence[Sequence[int]]) -> str:
@@ -409,7 +421,7 @@ def beneath_fast_noise(error_drop: float, averaged_drop: float | None) -> bool:
     return averaged_drop is not None and error_drop < LITTLE <= averaged_drop
 
 
-def _fall_told(drop: float, averaged: float) -> str:
+def _fall_told(drop: float, averaged: float | None) -> str:
     if drop <= 0:
         return "Refitting the model with it does not reduce the error on held-out data."
     if not beneath_fast_noise(drop, averaged):

@@ -54,20 +54,12 @@ def look_at_swift(
     result : SearchResult
         Result with the findings of both searches.
     """
-    family = [k for k in kinds if get_effect(k).moves_link]
-    clocked = problem.signals.time is not None and problem.robot is not None
     cutoffs = problem.signals.cutoff
     lowest = np.inf if cutoffs is None else float(cutoffs.min())
     window = max(SHORT_WINDOW, SHORT_IN_PERIODS / lowest)
-    if not family or not clocked or problem.signals.rate * window < FEWEST_SAMPLES:
-        return problem, result
-    residual = problem.torque - problem.explained(result.fit)
-    sensor = np.nan_to_num(sensor_noise(problem.signals, residual, problem.measured))
-    if np.any(position_noise(problem, result.fit) > sensor):  # coarse positions
-        family = [k for k in family if not get_effect(k).follows_acceleration]
+    family = _seen_within(problem, result, kinds, window)
     if not family:
         return problem, result
-    noise = make_terms(["acceleration_noise"], problem.n_joints)
     before = {j: h.kind for h in result.findings if h.kind in family for j in h.joints}
     others = result
     for _ in range(2):
@@ -75,20 +67,8 @@ def look_at_swift(
         room = settings.max_findings - len(slow)
         if room < 1:
             return problem, result
-        terms = (*problem.terms, *terms_on_rows(slow), *noise)
-        short = with_short_windows(problem, terms, window)
-        short.torque = problem.torque - others.ripple
-        # Errors of smoothing are equally large in short windows, and more significant in more
-        # windows.
-        more = short.rows.counts.sum() / problem.rows.counts.sum()
-        least = more * settings.least_gain
-        size = settings.size_share_short
-        gates = replace(settings, max_findings=room, least_gain=least, size_share=size)
-        slowed = {j for h in slow for c in h.candidates if c.term.effect.is_slow for j in c.joints}
-        moving = [h for h in result.findings if h.kind in family]
-        among = partial(_is_tried, slowed=slowed, known=moving)
-        given = problem.terms
-        moved = search(short, family, gates, nameless=False, among=among, earlier=slow, given=given)
+        short = _short_windows(problem, others, slow, window)
+        moved = _moved(problem, short, result, slow, family, replace(settings, max_findings=room))
         now = {j: h.kind for h in moved.findings for j in h.joints}
         fastest = [
             c.term.effect.fastest(c.term.shape) for h in moved.findings for c in h.candidates
@@ -104,8 +84,7 @@ def look_at_swift(
         beside = replace(problem, terms=TermSum((*problem.terms, *found)), _cache={})
         room = settings.max_findings - len(moved.findings)
         slower = [k for k in kinds if k not in family]
-        gates = replace(settings, max_findings=room)
-        others = search(beside, slower, gates, given=given)
+        others = search(beside, slower, replace(settings, max_findings=room), given=problem.terms)
         if _sites(others.findings) == _sites(slow):
             break
     known = terms_on_rows(others.findings)
@@ -117,6 +96,56 @@ def look_at_swift(
         fit=fit,
         ripple=others.ripple,
         candidates=result.candidates,
+    )
+
+
+def _seen_within(
+    problem: Problem, result: SearchResult, kinds: Sequence[str], window: float
+) -> list[str]:
+    """Kinds that move the link, and of which windows of some width in s can show anything."""
+    family = [k for k in kinds if get_effect(k).moves_link]
+    clocked = problem.signals.time is not None and problem.robot is not None
+    if not family or not clocked or problem.signals.rate * window < FEWEST_SAMPLES:
+        return []
+    residual = problem.torque - problem.explained(result.fit)
+    sensor = np.nan_to_num(sensor_noise(problem.signals, residual, problem.measured))
+    if np.any(position_noise(problem, result.fit) > sensor):  # coarse positions
+        return [k for k in family if not get_effect(k).follows_acceleration]
+    return family
+
+
+def _short_windows(
+    problem: Problem, others: SearchResult, slow: Sequence[Hypothesis], window: float
+) -> Problem:
+    """Rows of short windows, with the slow effects and the noise of accelerations as terms."""
+    noise = make_terms(["acceleration_noise"], problem.n_joints)
+    terms = (*problem.terms, *terms_on_rows(slow), *noise)
+    short = with_short_windows(problem, terms, window)
+    short.torque = problem.torque - others.ripple
+    return short
+
+
+def _moved(
+    problem: Problem,
+    short: Problem,
+    result: SearchResult,
+    slow: Sequence[Hypothesis],
+    family: Sequence[str],
+    settings: Settings,
+) -> SearchResult:
+    """Effects that move the link, from short windows."""
+    # Errors of smoothing are equally large in short windows, and more significant in more windows.
+    more = short.rows.counts.sum() / problem.rows.counts.sum()
+    gates = replace(
+        settings,
+        least_gain=more * settings.least_gain,
+        size_share=settings.size_share_short,
+    )
+    slowed = {j for h in slow for c in h.candidates if c.term.effect.is_slow for j in c.joints}
+    moving = [h for h in result.findings if h.kind in family]
+    among = partial(_is_tried, slowed=slowed, known=moving)
+    return search(
+        short, family, gates, nameless=False, among=among, earlier=slow, given=problem.terms
     )
 
 
