@@ -174,14 +174,15 @@ def _findings(both: Sequence[Diagnosis], names: Sequence[str]) -> list[dict[str,
     rows: list[dict[str, Any]] = []
     for side, (diagnosis, name) in enumerate(zip(both, names, strict=True)):
         for finding, card in zip(diagnosis.findings, diagnosis.story()["cards"], strict=True):
-            parameters = parameter_rows(plain(finding.to_dict()))
+            told = plain(finding.to_dict())
+            parameters = parameter_rows(told)
             for joint in finding.joints:
                 row = _row(rows, finding, joint)
                 if name in row["in"]:
                     continue
                 row["in"].append(name)
                 row["uncertain"] &= card["guess"]
-                row["confidence"][side] = finding.confidence
+                row["confidence"][side] = told.get("confidence")
                 row["titles"][side] = finding.title
                 row["error_drop"][side] = finding.error_drop
                 row["parameters"][side] = [p for p in parameters if p["joint"] in (joint, "–")]

@@ -22,7 +22,7 @@ def motion(rate, bits, fastest):
 
 
 @pytest.mark.parametrize("rate", [100, 500, 1000])
-@pytest.mark.parametrize("bits", [10, 12, 14])
+@pytest.mark.parametrize("bits", [10, 12, 13])
 def test_coarse_positions_are_smoothed_more_and_accelerations_get_better(rate, bits):
     signals, true = motion(rate, bits, fastest=1.5)
     usual = min(27.0, 0.24 * rate)
@@ -34,6 +34,15 @@ def test_coarse_positions_are_smoothed_more_and_accelerations_get_better(rate, b
     error, before = (np.std((m.ddq - true)[use]) for m in (chosen, other))
     assert chosen.cutoff.max() < 0.75 * usual
     assert error < 0.6 * before and error < 0.5 * np.std(true[use])
+
+
+@pytest.mark.parametrize("rate", [100, 500, 1000])
+def test_noise_that_is_a_tenth_of_the_accelerations_is_left(rate):
+    signals, true = motion(rate, 14, fastest=1.5)
+    chosen, other = smooth_motion(signals), smooth_motion(signals, min(27.0, 0.24 * rate))
+    use = (chosen.usable & other.usable).all(axis=1)
+    error, before = (np.std((m.ddq - true)[use]) for m in (chosen, other))
+    assert error <= before and error < 0.15 * np.std(true[use])
 
 
 @pytest.mark.parametrize("bits", [20, None])
