@@ -124,3 +124,27 @@ def test_a_narrow_bump_is_one_function_and_not_a_spring_and_a_stop(arm_log, foun
     torque[:, 0] += np.std(torque[:, 0]) * np.exp(-(((q - middle) / (0.12 * span)) ** 2))
 
     assert found_in(load_planar_arm(), arm_log.X, torque) == {"unknown": {1}}
+
+
+@pytest.mark.slow
+def test_two_effects_that_hide_each_other_are_both_named():
+    """Neither is significant alone, and a function of their three signals explains both."""
+    log = make_hidden_effect_log(
+        ROBOT, None, noise="low", n_trajectories=11, duration=6.0, random_state=8
+    )
+    run, row = log.X["trajectory"].to_numpy(), np.arange(len(log.X))
+    warmth = 6 * np.random.default_rng(8).normal(size=40)[run] + 3 * np.sin(row / 700)
+    X = log.X.assign(temp1=30.0, temp2=30 + warmth)
+    q, dq = X["q2"].to_numpy(), X["dq2"].to_numpy()
+    friction = -warmth * np.sign(dq) * (1 + np.abs(dq))
+    spring = np.exp(3.6 * (q - (q.max() + q.min()) / 2) / np.ptp(q))
+    torque, size = np.array(log.y), 0.6 * np.std(log.y[:, 1])
+    torque[:, 1] += size * (friction / np.std(friction) + spring / np.std(spring))
+
+    found = diagnosed(X, torque)
+
+    assert found.verdict == "missing"
+    assert {(f.kind, f.joints) for f in found.findings} == {
+        ("nonlinear_spring", (2,)),
+        ("temperature_friction", (2,)),
+    }
