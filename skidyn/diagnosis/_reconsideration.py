@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -105,11 +105,15 @@ class ReconsideringSearch(DuellingSearch):
             or all(self.of_one_position(best, j) for j in best.joints)
         ):
             return best, ()
+        tried = set()
         for rival in self._names_on(best, ranking):
             first = self.judged(rival)
-            if first is not None and self._second_name(first, best) is not None:
+            if first is None:
+                continue
+            if self._second_name(first, best) is not None:
                 return rival, ()
-        for rival in self._hidden_names(best, ranking):
+            tried.add(rival.kind)
+        for rival in self._hidden_names(best, tried):
             second = self._second_name(rival, best)
             if second is not None and self.judged(rival, second.candidates) is not None:
                 return rival, second.candidates
@@ -133,27 +137,20 @@ class ReconsideringSearch(DuellingSearch):
                 return h
         return None
 
-    def _hidden_names(
-        self, function: Hypothesis, ranking: Sequence[Hypothesis]
-    ) -> list[Hypothesis]:
+    def _hidden_names(self, function: Hypothesis, tried: Collection[str]) -> list[Hypothesis]:
         """Known effects on the joint of a function of several signals, significant or not.
 
-        Those of the ranking that are significant have been tried.
+        The strongest few kinds but for those that were tried.
         """
         if len(function.joints) > 1 or len(function.variables) < 2:
             return []
-        tried = {h.kind for h in self._names_on(function, ranking) if self.judged(h) is not None}
-        strongest = self.strongest(
-            lambda c: c.kind,
-            lambda c: (
-                c.kind not in tried | {UNKNOWN}
-                and c.joints == function.joints
-                and not some_recordings(c)
-            ),
-        )
-        drops = {id(c): drop for c, drop in zip(self.ranked, self.drops.tolist(), strict=True)}
-        first = sorted(strongest.values(), key=lambda c: -drops[id(c)])
-        names = self._finals([[c] for c in first[: self.settings.refined]])
+        strongest: dict[str, Candidate] = {}
+        for i in np.argsort(-self.drops, kind="stable").tolist():
+            c = self.ranked[i]
+            if c.joints == function.joints and not some_recordings(c):
+                strongest.setdefault(c.kind, c)
+        kinds = [kind for kind in strongest if kind not in {UNKNOWN, *tried}]
+        names = self._finals([[strongest[kind]] for kind in kinds[: self.settings.refined]])
         return [h for h in names if not self.denied(h, function)]
 
     def _names_on(self, function: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -97,7 +97,10 @@ class _Times:
         self.problem, self.names = problem, problem.rows.recordings
         rows = problem.rows
         self.time, self.of = np.concatenate(rows.time), np.concatenate(rows.trajectory)
-        self.clock, self.recording = problem.signals.clock, problem.signals.trajectory
+        clock, recording = problem.signals.clock, problem.signals.trajectory
+        logged = {name: clock[recording == name] for name in self.names.tolist()}
+        # first and last sample of every recording, which rows do not reach
+        self.ends = {name: (float(t.min()), float(t.max())) for name, t in logged.items()}
         order = np.lexsort((self.time, self.of))
         borders = np.flatnonzero(np.diff(self.of[order])) + 1
         self.runs: list[NDArray[np.int64]] = np.split(order, borders)
@@ -142,11 +145,9 @@ class _Times:
             recordings.append(name)
             if not own.all():
                 half = 0.5 * self.problem.rows.hop
-                first, last = float(time[own].min()) - half, float(time[own].max()) + half
-                # rows do not reach the first and the last sample
-                clock = self.clock[self.recording == name]
-                first = float(clock.min()) if own[0] else first
-                last = float(clock.max()) if own[-1] else last
+                begin, end = self.ends[name]
+                first = begin if own[0] else float(time[own].min()) - half
+                last = end if own[-1] else float(time[own].max()) + half
                 spans.append((name, first, last))
         return tuple(recordings), tuple(spans)
 

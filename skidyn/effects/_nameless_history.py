@@ -160,6 +160,22 @@ class _OfAnyJoint(NamelessEffect):
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         return [{"other": k} for k in range(signals.n_joints)]
 
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        k = int(shape.get("other", joint))
+        # the same for every joint on which it may act
+        columns: Array = signals.once((self.kind, k), lambda: self.of_history(signals, k))
+        return columns
+
+    def of_history(self, signals: Signals, joint: int) -> Array:
+        """Columns from the history of a joint, from 0, shape (n_samples, n_coefficients)."""
+        raise NotImplementedError
+
+
+def _fading(since: Array, scales: Sequence[float], direction: Array) -> Array:
+    """Exponentials of what has passed since a reversal, in either direction and by direction."""
+    columns = np.column_stack([np.exp(-since / scale) for scale in scales])
+    return np.hstack([columns, columns * direction[:, None]])
+
 
 class FunctionOfWaySinceReversal(_OfAnyJoint):
     """A torque that fades or grows with the distance since the last reversal of a joint."""
@@ -168,20 +184,12 @@ class FunctionOfWaySinceReversal(_OfAnyJoint):
     title = "Function of the distance since the last reversal"
     formula = r"f(|q_k - q_{k,\mathrm{turn}}|)"
     coefficients = unnamed_coefficients(2 * len(_WAYS))
-    depends_on = ("q_other", "dq_other")
 
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        k = int(shape.get("other", joint))
-
-        def fading() -> Array:
-            strokes = strokes_of(signals, k)
-            way = np.zeros(signals.n_samples)
-            way[strokes.rows] = strokes.way / signals.unit[k]
-            columns = np.column_stack([np.exp(-way / w) for w in _WAYS])
-            return np.hstack([columns, columns * signals.sign[:, [k]]])
-
-        columns: Array = signals.once(("way since reversal", k), fading)
-        return columns
+    def of_history(self, signals: Signals, joint: int) -> Array:
+        strokes = strokes_of(signals, joint)
+        way = np.zeros(signals.n_samples)
+        way[strokes.rows] = strokes.way / signals.unit[joint]
+        return _fading(way, _WAYS, signals.sign[:, joint])
 
 
 class FunctionOfTimeSinceReversal(_OfAnyJoint):
@@ -194,16 +202,8 @@ class FunctionOfTimeSinceReversal(_OfAnyJoint):
     depends_on = ("dq_other", "time")
     needs = ("time",)
 
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        k = int(shape["other"])
-
-        def fading() -> Array:
-            since = _time_since_reversal(signals, k)
-            columns = np.column_stack([np.exp(-since / time) for time in _SINCE])
-            return np.hstack([columns, columns * signals.sign[:, [k]]])
-
-        columns: Array = signals.once(("time since reversal", k), fading)
-        return columns
+    def of_history(self, signals: Signals, joint: int) -> Array:
+        return _fading(_time_since_reversal(signals, joint), _SINCE, signals.sign[:, joint])
 
 
 class FunctionOfLastReversal(_OfAnyJoint):
@@ -269,16 +269,10 @@ class TorqueOfRecentMotion(_OfAnyJoint):
     needs = ("time",)
     softness = 2e-3
 
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        k = int(shape["other"])
-
-        def averaged() -> Array:
-            speed = np.abs(signals.dq[:, k])
-            powers = speed, speed**2
-            return np.column_stack([_followed(x, signals, t) for x in powers for t in _COOLING])
-
-        columns: Array = signals.once(("averaged speed", k), averaged)
-        return columns
+    def of_history(self, signals: Signals, joint: int) -> Array:
+        speed = np.abs(signals.dq[:, joint])
+        powers = speed, speed**2
+        return np.column_stack([_followed(x, signals, t) for x in powers for t in _COOLING])
 
 
 class TorqueOfLargestPosition(_OfAnyJoint):
@@ -293,8 +287,8 @@ class TorqueOfLargestPosition(_OfAnyJoint):
     coefficients = unnamed_coefficients(2)
     depends_on = ("q_other",)
 
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        q = signals.q[:, int(shape["other"])]
+    def of_history(self, signals: Signals, joint: int) -> Array:
+        q = signals.q[:, joint]
         columns = np.zeros((signals.n_samples, 2))
         for rows in signals.segments:
             own = q[rows]
@@ -395,17 +389,11 @@ class RelaxingSpring(_OfAnyJoint):
     title = "Torque that relaxes"
     formula = r"\sum_i k_i\,(q_k - q_i),\quad T_i\,\dot q_i = q_k - q_i"
     coefficients = unnamed_coefficients(len(_RELAXATION))
-    depends_on = ("q_other", "dq_other")
     needs = ("time",)
 
-    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        k = int(shape.get("other", joint))
-        q = signals.q[:, k]
-        columns: Array = signals.once(
-            ("relaxing", k),
-            lambda: np.column_stack([q - _followed(q, signals, time) for time in _RELAXATION]),
-        )
-        return columns
+    def of_history(self, signals: Signals, joint: int) -> Array:
+        q = signals.q[:, joint]
+        return np.column_stack([q - _followed(q, signals, time) for time in _RELAXATION])
 
 
 def _followed(x: Array, signals: Signals, time_constant: float) -> Array:

@@ -158,6 +158,8 @@ class Rest:
         Orthonormal columns that all recordings have in common.
     squares : ndarray of shape (GROUPS, n_lags)
         Squares of the rest in every group of rows.
+    speed : ndarray of shape (n_used_rows,), rad/s or m/s
+        Size of the velocity.
     """
 
     joint: int
@@ -166,6 +168,7 @@ class Rest:
     rest: Array
     shared: Array
     squares: Array
+    speed: Array
 
 
 def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
@@ -177,7 +180,7 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
     tables: list[tuple[int, Array, Array]] = []
     costs: dict[int, list[Array]] = {}
     counts: dict[int, int] = {}
-    first, speeds = _first_half(fits), np.abs(fits.average(Reading().motion(fits.signals).dq))
+    first = _first_half(fits)
     for one in _rests(fits, lags_tried):
         j, total = one.joint, one.squares.sum(axis=0)
         if int(np.argmin(total)) in (0, len(lags_tried) - 1):
@@ -193,8 +196,7 @@ def _delay_within(fits: Fits, lags_tried: Array) -> tuple[Delay, int, int]:
         lags[j] = _lowest(total, lags_tried)
         drifts[j] = _lowest(total - sooner, lags_tried) - _lowest(sooner, lags_tried)
         own_errors[j] = _spread([_lowest(total - group, lags_tried) for group in one.squares])
-        speed = speeds[one.rows, j]
-        fast = speed > np.median(speed)
+        fast = one.speed > np.median(one.speed)
         halves[j] = [
             _lowest((one.rest[rows] ** 2).sum(axis=0), lags_tried) for rows in (~fast, fast)
         ]
@@ -234,7 +236,8 @@ def _rests(fits: Fits, lags_tried: Array) -> Iterator[Rest]:
         squares = _squares(rest)
         if spread <= 0 or squares.sum(axis=0).min() > LEFT * spread:
             continue
-        yield Rest(j, use, y, rest, shared, squares)
+        speed = np.abs(fits.average(s.dq[:, j])[use])
+        yield Rest(j, use, y, rest, shared, squares, speed)
 
 
 def _squares(rest: Array) -> Array:
