@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -263,7 +264,7 @@ def _sure(
     errors: tuple[Array, Array],
     whole: bool,
 ) -> Finding:
-    """The finding with the probability that it is identified correctly."""
+    """The finding with its score and the probability that it is identified correctly."""
     if not finding.terms:
         return finding
     joints = _reached(finding)
@@ -276,7 +277,8 @@ def _sure(
     ratio = errors[1] / np.maximum(parts.noise, np.finfo(float).tiny)
     alike = max(1.0, float(ratio.min())) if len(ratio) > 1 else 1.0
     in_some = any(t.trajectories is not None for t in finding.terms)
-    probability = confidence(
+    likely = partial(
+        confidence,
         finding.margin,
         float(parts.inflation[joints].max()),
         max(f.error_drop for f in findings if f.kind == finding.kind),
@@ -305,7 +307,13 @@ def _sure(
             "if its formula were different, which makes the name less certain."
         )
     # Only one of several equivalent joints or pairs of joints is right.
-    return replace(finding, sentence=told, confidence=probability / (1 + len(finding.elsewhere)))
+    places = 1 + len(finding.elsewhere)
+    return replace(
+        finding,
+        sentence=told,
+        score=likely(calibrate=False) / places,
+        confidence=likely() / places,
+    )
 
 
 def _reached(finding: Finding) -> list[int]:

@@ -72,6 +72,8 @@ class Finding:
         if a simpler effect was preferred.
     confidence : float or None
         Probability that the effect is identified correctly.
+    score : float or None
+        The weight by which the rule compares it with other explanations, between 0 and 1.
     trajectories : tuple of int or None
         Recordings with the effect; None if all have it.
     when : list of Episode
@@ -121,6 +123,7 @@ class Finding:
     terms: tuple[Term, ...]
     margin: float = 1.0
     confidence: float | None = None
+    score: float | None = None
     trajectories: tuple[int, ...] | None = None
     when: list[Episode] = field(default_factory=list)
     curves: list[dict[str, Any]] = field(default_factory=list, repr=False)

@@ -119,20 +119,20 @@ BETWEEN = 0.02
 #: recordings are held out instead of whole ones.
 CONFINED = 0.8
 
-#: An effect with a lower confidence that removes a smaller share of the error is not a finding,
+#: An effect with a lower score that removes a smaller share of the error is not a finding,
 #: unless another effect is equally good (``_withdrawal.py``; ``confidence.py``).
 GUESS = 0.5
-#: Below this confidence, it is not a finding whatever it removes.
+#: Below this score, it is not a finding whatever it removes.
 UNLIKELY = 0.02
 #: The only finding, if it removes a larger share and only noise is left, is reported as the most
-#: likely effect even with a lower confidence; what removes less has to be likely by itself, also if
+#: likely effect even with a lower score; what removes less has to be likely by itself, also if
 #: other explanations are equally good.
 MUCH = 0.1
 #: An effect that removes a smaller share of the error of samples and of averaged rows is a finding
-#: only with this confidence: in generated logs, such effects with a lower confidence were wrong
+#: only with this score: in generated logs, such effects with a lower score were wrong
 #: (``confidence.py``). The same for an unknown function with this share of the error of samples,
 #: since noise of derivatives may cause it; and for an effect that moves the link, whatever its
-#: confidence, since the smoothing of derivatives leaves torques like those of a soft joint
+#: score, since the smoothing of derivatives leaves torques like those of a soft joint
 #: (``nothing_hidden.py``).
 LITTLE, SURE_OF_LITTLE, LITTLE_OF_DERIVATIVES = 0.005, 0.9, 0.02
 

@@ -297,9 +297,9 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
         if finding.change > CHANGE_SHARE and any(term.spans for term in finding.terms):
             return False
         if finding.instead is not None:
-            return finding.confidence is None or finding.confidence >= GUESS
+            return finding.score is None or finding.score >= GUESS
         of_kind = [f for f in diagnosis.findings if f.kind == finding.kind]
-        likely = 1.0 if finding.confidence is None else finding.confidence
+        likely = 1.0 if finding.score is None else finding.score
         if likely < UNLIKELY:
             return False
         moves = any(term.effect.moves_link for term in finding.terms)

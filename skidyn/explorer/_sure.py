@@ -53,9 +53,9 @@ def sure_told(
     >>> sure_told(Margin(0.8, "Offset"), 1.0, 0.5, True)
     'confidence 98%'
     >>> sure_told(Margin(0.8, "Offset"), 12.0, 0.5, True)  # much error remains
-    'confidence 88%'
+    'confidence 91%'
     >>> sure_told(Margin(0.01, "Offset"), 1.0, 0.5, True)
-    'confidence 96%; offset removes nearly as much of the error'
+    'confidence 95%; offset removes nearly as much of the error'
     >>> sure_told(Margin(-0.3, "Spring"), 1.0, 0.5, True)
     'low confidence: spring removes more of the error'
     """
