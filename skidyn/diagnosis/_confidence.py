@@ -62,9 +62,9 @@ COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: these with a score of .88, in fourteen collections of logs, 175 were right, since the simpler of
 #: the two was named.
 MOST, MOST_IN_DOUBT, MOST_WITH_RIVAL = 0.98, 0.88, 0.93
-#: The logit of the confidence in a known effect that fits is this constant plus this multiple of the
-#: logit of its score. Of 629 of them in fourteen collections of logs (versions 34 to 38), .82 of
-#: those with a score below .60 were right, .90 up to .75, .88 up to .88, .96 up to .97, and .99
+#: The logit of the confidence in a known effect that fits is this constant plus this multiple of
+#: the logit of its score. Of 629 of them in fourteen collections of logs (versions 34 to 38), .82
+#: of those with a score below .60 were right, .90 up to .75, .88 up to .88, .96 up to .97, and .99
 #: above. What does not fit is as likely as its score: on robots, most such names were wrong.
 STATED, STATED_SLOPE = 1.1, 0.6
 

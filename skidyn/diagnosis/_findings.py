@@ -72,8 +72,6 @@ class Finding:
         if a simpler effect was preferred.
     confidence : float or None
         Probability that the effect is identified correctly.
-    score : float or None
-        The weight by which the rule compares it with other explanations, between 0 and 1.
     trajectories : tuple of int or None
         Recordings with the effect; None if all have it.
     when : list of Episode
@@ -101,6 +99,8 @@ class Finding:
     averaged_drop : float or None
         As ``error_drop``, of the torque averaged over windows of motion, without the noise that is
         faster than these.
+    score : float or None
+        The weight by which the rule compares it with other explanations, between 0 and 1.
 
     Examples
     --------
@@ -123,7 +123,6 @@ class Finding:
     terms: tuple[Term, ...]
     margin: float = 1.0
     confidence: float | None = None
-    score: float | None = None
     trajectories: tuple[int, ...] | None = None
     when: list[Episode] = field(default_factory=list)
     curves: list[dict[str, Any]] = field(default_factory=list, repr=False)
@@ -134,6 +133,7 @@ class Finding:
     nearest: dict[str, Any] | None = None
     lead: float = np.inf
     averaged_drop: float | None = None
+    score: float | None = None
 
     def _repr_html_(self) -> str:
         from skidyn.diagnosis._notebook import finding_card
