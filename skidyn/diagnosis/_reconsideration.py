@@ -25,7 +25,8 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
-from skidyn.diagnosis._rule import BETWEEN, NEARLY
+from skidyn.diagnosis._remainder import noise_level
+from skidyn.diagnosis._rule import BETWEEN, NEARLY, REMAINDER_TIMES_NOISE
 from skidyn.diagnosis._search_state import still_free
 from skidyn.effects import Term, get_effect
 
@@ -67,7 +68,45 @@ class ReconsideringSearch(DuellingSearch):
                 margin, alike = margin_over(judged, rivals), self._alike(judged, rivals)
                 judged = self.on_neighbours(self.on_each_joint(judged))
                 return ranked_with(replace(judged, margin=margin, alike=alike), offered)
-        return None
+        return self._first_of_hidden_pair(offered)
+
+    def _first_of_hidden_pair(self, offered: list[Hypothesis]) -> Hypothesis | None:
+        """The first of two known effects of which neither is significant without the other.
+
+        On joints with an error far above the noise, of which each of the two leaves so much that it
+        hides the other.
+        """
+        if self._reconsidering or not self.nameless:
+            return None
+        best: Hypothesis | None = None
+        highest = 0.0
+        for j in self._far_above_noise():
+            for name in self._strongest_on((j,)):
+                second = self._second_beside(name, (j,))
+                if second is None or name.score + second.score <= highest:
+                    continue
+                judged = self.judged(name, second.candidates)
+                if judged is not None:
+                    best, highest = judged, name.score + second.score
+        return None if best is None else ranked_with(best, offered)
+
+    def _far_above_noise(self) -> list[int]:
+        """Joints, from 0, with an averaged error that is a multiple even of the noise of samples."""
+        residual = self.problem.torque - self.ripple - self.problem.explained(self.fit)
+        error = np.sqrt(self.left / np.maximum(self._counts, 1))
+        material = error > REMAINDER_TIMES_NOISE * noise_level(self.problem, residual)
+        return np.flatnonzero(material).tolist()
+
+    def _second_beside(self, first: Hypothesis, joints: Sequence[int]) -> Hypothesis | None:
+        """The best known effect of some joints that is significant beside a first one."""
+        kept = self._state()
+        self.add(first)
+        self.refit()
+        self.sigma, self.left = self.weights(), self._left()
+        names = [h for h in self._known_alone() if set(joints) <= set(h.joints)]
+        judged = [h for h in map(self.judged, names) if h is not None]
+        self._restore(kept)
+        return max(judged, key=lambda h: h.score, default=None)
 
     def _offset_later(self, step: Hypothesis) -> Hypothesis:
         """A step in time between two recordings, as an offset of the later ones."""
@@ -144,14 +183,20 @@ class ReconsideringSearch(DuellingSearch):
         """
         if len(function.joints) > 1 or len(function.variables) < 2:
             return []
+        names = self._strongest_on(function.joints, tried)
+        return [h for h in names if not self.denied(h, function)]
+
+    def _strongest_on(
+        self, joints: tuple[int, ...], except_for: Collection[str] = ()
+    ) -> list[Hypothesis]:
+        """The strongest few known kinds on exactly these joints, significant or not."""
         strongest: dict[str, Candidate] = {}
         for i in np.argsort(-self.drops, kind="stable").tolist():
             c = self.ranked[i]
-            if c.joints == function.joints and not some_recordings(c):
+            if c.joints == joints and not some_recordings(c):
                 strongest.setdefault(c.kind, c)
-        kinds = [kind for kind in strongest if kind not in {UNKNOWN, *tried}]
-        names = self._finals([[strongest[kind]] for kind in kinds[: self.settings.refined]])
-        return [h for h in names if not self.denied(h, function)]
+        kinds = [kind for kind in strongest if kind not in {UNKNOWN, *except_for}]
+        return self._finals([[strongest[kind]] for kind in kinds[: self.settings.refined]])
 
     def _names_on(self, function: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The best few known effects of all recordings that may replace a function.
