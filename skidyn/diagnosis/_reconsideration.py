@@ -91,7 +91,7 @@ class ReconsideringSearch(DuellingSearch):
         return None if best is None else ranked_with(best, offered)
 
     def _far_above_noise(self) -> list[int]:
-        """Joints, from 0, with an averaged error above that which even samples may have by noise."""
+        """Joints, from 0, whose averaged error is above what noise explains in single samples."""
         residual = self.problem.torque - self.ripple - self.problem.explained(self.fit)
         error = np.sqrt(self.left / np.maximum(self._counts, 1))
         material = error > REMAINDER_TIMES_NOISE * noise_level(self.problem, residual)
