@@ -270,10 +270,13 @@ class Signals:
     def named(self, name: str) -> Array:
         """A signal by its name, joints counted from 1: ``"dq3"``, ``"temp2"``, ``"time"``, ...
 
-        ``"tau3"`` is the torque of the model, ``"trajectory"`` the number of the recording.
+        ``"tau3"`` is the torque of the model, ``"trajectory"`` the number of the recording,
+        ``"since_start"`` the time since the first sample of the recording.
         """
         if name == "time":
             return self.clock
+        if name == "since_start":
+            return self.since_start
         if name == "trajectory":
             return self.trajectory.astype(float)
         kind = name.rstrip("0123456789")

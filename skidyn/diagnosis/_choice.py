@@ -74,6 +74,7 @@ class ChoosingSearch(RankingSearch):
                 if simpler and self._as_good(own, errors, part):
                     best = rival
         best = self._nearest_to_description(self._simplest_of_family(best, ranking), ranking)
+        best = self._by_its_size(best, ranking)
         return self._with_fewest_numbers(self._plain_friction_first(best, ranking), ranking)
 
     def _with_fewest_numbers(self, best: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
@@ -90,6 +91,19 @@ class ChoosingSearch(RankingSearch):
             and not within_recordings(h)
         ]
         return min(equal, key=lambda h: (h.n_parameters, -h.score), default=best)
+
+    def _by_its_size(self, best: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
+        """The kind that an effect of its size usually is, if that is nearly as good."""
+        if best.kind == UNKNOWN or len(best.candidates) != 1:
+            return best
+        (own,) = best.candidates
+        size, _ = self.tester(self.chosen).estimate(own.rows)
+        kind = own.term.effect.usually(size, own.term.shape, self.problem.few)
+        least = (1 - self.settings.simpler_share) * best.score
+        when = own.term.trajectories
+        near = [h for h in ranking if h.kind == kind and h.score >= least]
+        near = [h for h in near if all(c.term.trajectories == when for c in h.candidates)]
+        return max(near, key=lambda h: h.score, default=best)
 
     def _plain_friction_first(self, best: Hypothesis, ranking: Sequence[Hypothesis]) -> Hypothesis:
         """Plain friction that the model lacks, before what may only resemble it.

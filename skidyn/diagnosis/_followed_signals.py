@@ -101,8 +101,13 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     numbers, fold = np.unique(problem.fold[joint][::step], return_inverse=True)
     if len(numbers) < 4:
         return Followed([], [], [], changing, [], [])
+    others = {name: x for name, x in signals.items() if name != f"dq{joint + 1}"}
     nearest = _nearest(joint, range(problem.n_joints))
     close = {name: x for name, x in signals.items() if _joint_of(name) in nearest}
+    if problem.signals.time is not None and len(rows.recordings) > 2:
+        # other recordings have the same times as what is held out
+        since = average_at_rows(problem, joint, problem.signals.since_start)[::step]
+        signals, close = signals | {"since_start": since}, close | {"since_start": since}
     sets = sets_of_signals(signals, y, fold, close)
     several = [names for names in sets if len(names) > 1]
     with_function = [product_with_function(signals, y, fold, names) for names in several]
@@ -114,9 +119,7 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     loaded = []
     if problem.robot is not None and problem.signals.load is not None:
         load = average_at_rows(problem, joint, problem.signals.load[:, joint])[::step]
-        # friction under load is in the catalogue
-        others = {name: x for name, x in signals.items() if name != f"dq{joint + 1}"}
-        one = product_with_load(others, load, y, fold)
+        one = product_with_load(others, load, y, fold)  # friction under load has a name
         loaded = [] if one is None else [one]
     turning = np.flatnonzero(~problem.signals.prismatic).tolist()
     positions = {k: signals[f"q{k + 1}"] for k in sorted(_nearest(joint, turning))}

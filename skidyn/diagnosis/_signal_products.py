@@ -255,4 +255,6 @@ def simple_functions(name: str, x: Array) -> list[Factor]:
         return [Factor(name, function, middle) for function in functions]
     if name.startswith("dq"):
         return [Factor(name, function) for function in ("value", "size", "side")]
+    if name == "since_start":  # grows, or changes its sign
+        return [Factor(name, "value", middle) for middle in (0.0, float(x.max() / 2))]
     return [Factor(name, "value")]

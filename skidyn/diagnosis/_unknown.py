@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._proposal import Proposal, propose
-from skidyn.diagnosis._variables import VariableTest, depends_on
+from skidyn.diagnosis._variables import VariableTest, average_at_rows, depends_on
 from skidyn.effects import NamelessEffect, Term, TermSum
 from skidyn.evidence import Problem, jackknife, left_out_coefficients
 
@@ -131,7 +131,8 @@ def describe_unknowns(
             rows = without(problem.term_rows(term)[joint])
             explained = rows @ whole[span]
             residual = target[joint] - design[joint] @ whole + explained
-            tests = depends_on(problem, joint, residual, guessed, rows, without)
+            in_time = _since_start(problem, joint) if _follows_start(term) else rows
+            tests = depends_on(problem, joint, residual, guessed, in_time, without)
             needed = {t.variable for t in tests if t.needed}
             if effect.is_of_one_number or not needed:
                 needed = set(guessed)
@@ -141,6 +142,17 @@ def describe_unknowns(
             proposal = propose(problem, joint, residual, explained, variables, waves, without)
             found.append(UnknownTorque(joint + 1, variables, tuple(tests), shape, proposal))
     return found
+
+
+def _follows_start(term: Term) -> bool:
+    """Whether a torque is a function of the time since the start of each recording, and others."""
+    return "since_start" in (*term.shape.get("of", ()), term.shape.get("by"))
+
+
+def _since_start(problem: Problem, joint: int) -> Array:
+    """Time since the start at the rows of a joint, without its mean, (n_rows, 1), s."""
+    since = average_at_rows(problem, joint, problem.signals.since_start)
+    return np.asarray((since - since.mean())[:, None])
 
 
 def _waves(term: Term) -> list[str]:

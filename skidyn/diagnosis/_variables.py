@@ -159,7 +159,8 @@ def depends_on(
     hypothesis : sequence of str
         Signals of the fitted function.
     columns : ndarray of shape (n_rows, k)
-        Rows of that function, used for ``"time"`` if it is periodic in time.
+        Rows used for ``"time"``: those of that function if it is periodic in time, or the time
+        since the start of the recording.
     without : callable
         Function that removes from rows the part that known terms of the model can represent.
 

@@ -282,6 +282,27 @@ class Effect:
         """
         return True
 
+    def usually(
+        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals
+    ) -> str | None:
+        """Kind that an effect with such coefficients usually is, if that is nearly as good.
+
+        Parameters
+        ----------
+        coefficients : ndarray of shape (n_coefficients,)
+            Fitted values.
+        shape : mapping
+            Shape parameters.
+        signals : Signals
+            Motion and robot.
+
+        Returns
+        -------
+        str or None
+            None, its own kind, by default.
+        """
+        return None
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         """Columns of the effect on its own joint.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
-from skidyn.effects._nameless_signals import products_of_low_order, ranges_of
+from skidyn.effects._nameless_signals import logged_variables, products_of_low_order, ranges_of
 from skidyn.effects._parameters import Coefficient
 
 
@@ -57,7 +57,7 @@ class ProductOfSignals(NamelessEffect):
     search = "screened"
 
     def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(shape["of"]))
+        return logged_variables(shape["of"])
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         return []
@@ -95,7 +95,7 @@ class ProductWithFunction(NamelessEffect):
     search = "screened"
 
     def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
-        return tuple(sorted((shape["by"], *shape["of"])))
+        return logged_variables(sorted((shape["by"], *shape["of"])))
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         return []

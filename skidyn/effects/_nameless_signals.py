@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -30,6 +30,11 @@ _UNEQUAL = 0.2
 _PAIRS = 28
 
 
+def logged_variables(names: Iterable[str]) -> tuple[str, ...]:
+    """Logged signals behind some signals: the time behind that since the start of a recording."""
+    return tuple(dict.fromkeys("time" if name == "since_start" else name for name in names))
+
+
 class FunctionOfSignals(NamelessEffect):
     """A smooth function of the few signals on which the residual was found to depend.
 
@@ -42,7 +47,7 @@ class FunctionOfSignals(NamelessEffect):
     drawn = 1e-2
 
     def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
-        return tuple(shape["of"])
+        return logged_variables(shape["of"])
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         return []

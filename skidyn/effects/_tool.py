@@ -248,14 +248,16 @@ class ExternalWrench(_ToolEffect):
         return (*self.coefficients[:3], *products)
 
     def can_have(self, coefficients: Array, shape: Mapping[str, Any], signals: Signals) -> bool:
-        assert signals.robot is not None
-        size = float(np.linalg.norm(signals.robot.gravity))
-        if "arm" not in shape or size == 0:
-            return True
         # A weight on a point that turns with the tool is a payload.
-        down = signals.robot.gravity / size
-        aside = coefficients[:3] - (coefficients[:3] @ down) * down
-        return bool(np.linalg.norm(aside) > LEAST_ASIDE * np.linalg.norm(coefficients[:3]))
+        return "arm" not in shape or not _is_vertical(coefficients[:3], signals)
+
+    def usually(
+        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals
+    ) -> str | None:
+        assert signals.robot is not None
+        if "on_tool" in shape or not _is_vertical(coefficients[:3], signals):
+            return None
+        return "payload" if coefficients[:3] @ signals.robot.gravity > 0 else None
 
     def parameters(
         self, coefficients: Array, shape: Mapping[str, Any], signals: Signals | None = None
@@ -280,6 +282,17 @@ class ExternalWrench(_ToolEffect):
         force = {f"{frame}force_{a}": "N" for frame in frames for a in "xyz"}
         force |= {f"arm_{a}": "m" for a in "xyz"}
         return force | {f"{frame}moment_{a}": "N m" for frame in frames for a in "xyz"}
+
+
+def _is_vertical(force: Array, signals: Signals) -> bool:
+    """Whether a force in the frame of the base is along gravity, as a weight is."""
+    assert signals.robot is not None
+    size = float(np.linalg.norm(signals.robot.gravity))
+    if size == 0:
+        return False
+    down = signals.robot.gravity / size
+    aside = np.linalg.norm(force - (force @ down) * down)
+    return bool(aside <= LEAST_ASIDE * np.linalg.norm(force))
 
 
 #: Power of the depth with which the force between round bodies grows (Hertz 1882).

@@ -38,6 +38,13 @@ FORMS = {
         None,
     ),
     "remembers motion": (1, 0.8, lambda x: _warmed(x, "dq2", 1.5), {"dq2"}, None),
+    "drags less and less": (
+        1,
+        0.5,
+        lambda x: x["dq2"] * (x["time"] - x.groupby("trajectory")["time"].transform("median")),
+        {"dq2", "time"},
+        None,
+    ),
     "bump": (2, 1.2, lambda x: np.exp(-((x["q2"] / 0.15) ** 2)), {"q2"}, None),
 }
 #: Forms for which the signals are chosen among those of six joints.
@@ -51,6 +58,7 @@ TOGETHER = [
     pytest.param(("snaps over",), marks=pytest.mark.slow),
     ("remembers a reversal",),
     ("remembers motion",),
+    ("drags less and less",),
     pytest.param(("pushes during motion",), marks=pytest.mark.slow),
 ]
 LENGTH = {"n_trajectories": 6, "duration": 6.0}

@@ -56,6 +56,15 @@ def test_torques_of_a_slower_clock(recorded, told_of):
     assert told.certainty == "noted" and told.suspicion.startswith("torques were interpolated")
 
 
+def test_equal_steps_of_coarse_sensors_are_not_interpolated(arm, told_of):
+    """Two joints that move alike make the same steps at the same time."""
+    log = make_hidden_effect_log(arm, None, n_trajectories=3, rate=1000, random_state=4)
+    step = 2 * np.pi / 2**14
+    position = (log.frame["q1"] / step).round() * step
+    frame = log.frame.assign(q1=position, q2=position)
+    assert "interpolated_rows" not in told_of(frame)
+
+
 @pytest.mark.parametrize("unit", [0.007, 0.009, 0.0125, 0.025])
 def test_stamps_that_are_rounded(recorded, told_of, unit):
     frame = recorded.frame
