@@ -29,6 +29,8 @@ WORTH = 0.01
 #: Rows per second in which a slow wave is searched, frequencies of the spectrum per resolved one,
 #: and width, Hz, of the band around a line whose median is its noise.
 SLOW_RATE, FINER, AROUND = 40.0, 4, 2.0
+#: Number of periods within the longest recording from which a wave is no drift.
+PERIODS = 1.5
 #: Longest time, s, over which a slow wave has a common phase.
 LONGEST = 6000.0
 #: Share of a wave from which motion contains it.
@@ -154,7 +156,8 @@ def slow_lines(
     use : ndarray of shape (n_samples,) of bool
         Samples that are used.
     band : (float, float), Hz
-        Lowest and highest frequency.
+        Lowest and highest frequency. A wave by the time of the log may be slower if one and a half
+        of its periods fit into a recording.
 
     Returns
     -------
@@ -166,8 +169,12 @@ def slow_lines(
     """
     found = []
     band = (band[0], min(band[1], HIGHEST * signals.rate))
-    for time, shape in ((signals.clock, {}), (signals.since_start, {"since_start": 1.0})):
-        frequency = _slow_line(time, residual, carriers, use, band)
+    lower = min(band[0], PERIODS / max(float(signals.since_start.max()), 1e-9))
+    for time, lowest, shape in (
+        (signals.clock, lower, {}),
+        (signals.since_start, band[0], {"since_start": 1.0}),
+    ):
+        frequency = _slow_line(time, residual, carriers, use, (lowest, band[1]))
         if frequency is not None and not _in_motion(signals, time, frequency):
             found.append({"frequency": frequency, **shape})
     return found

@@ -17,7 +17,7 @@ from skidyn.diagnosis._held_out import held_out_residual
 from skidyn.diagnosis._hypothesis import Hypothesis, SearchResult, found_terms
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._noise import sensor_noise
-from skidyn.diagnosis._remainder import position_noise, root_mean_square
+from skidyn.diagnosis._remainder import position_noises, root_mean_square
 from skidyn.diagnosis._rule import Settings
 from skidyn.diagnosis._search_state import replace_torque
 from skidyn.diagnosis._withdrawal import to_withdraw, unsupported, useless, without
@@ -40,8 +40,8 @@ class Judged:
         Held-out residual of the last model.
     own_torque : dict
         Torque of every finding's term by joint.
-    noise : tuple of two ndarrays of shape (n_joints,), N m or N
-        Noise of the torque sensor, and of positions.
+    noise : tuple of three ndarrays of shape (n_joints,), N m or N
+        Noise of the torque sensor, of positions, and of these in averaged rows.
     """
 
     problem: Problem
@@ -51,7 +51,7 @@ class Judged:
     averages: list[list[float]]
     residual: Array
     own_torque: dict[Term, dict[int, Array]]
-    noise: tuple[Array, Array]
+    noise: tuple[Array, Array, Array]
 
     @property
     def terms(self) -> list[Term]:
@@ -99,7 +99,7 @@ def worth_their_terms(
     tried_last: list[Hypothesis] = []
     while True:
         judged = _judged(problem, result, torque, sliding)
-        needless = useless(problem, result, judged.errors, judged.noise, settings.least_drop)
+        needless = useless(problem, result, judged.errors, judged.noise[:2], settings.least_drop)
         if needless is not None and all(
             h is not needless[0] for h in [*tried_last, result.findings[-1]]
         ):
@@ -137,7 +137,7 @@ def _judged(
         )
     noise = (
         sensor_noise(problem.signals, residual, problem.measured),
-        position_noise(problem, result.fit),
+        *position_noises(problem, result.fit),
     )
     # All terms at every sample would need most of the memory for a long log.
     own_torque = {t: own[t] for t in found}

@@ -27,6 +27,7 @@ from skidyn.diagnosis._rule import (
     REMAINDER_SLOW_TIMES_NOISE,
     REMAINDER_TIMES_NOISE,
     SELDOM_SHARE_OF_FOLDS,
+    SLOW_ALIKE,
 )
 from skidyn.evidence import Fit, Problem, smooth_motion
 
@@ -105,7 +106,7 @@ def root_mean_square(values: Array) -> float:
 def find_remainder(
     problem: Problem,
     fit: Fit,
-    noises: tuple[Array, Array],
+    noises: tuple[Array, Array, Array],
     torque: Array,
     rmse: Array,
     share: Array,
@@ -118,8 +119,9 @@ def find_remainder(
         Motion and rows.
     fit : Fit
         Fit of the completed model, with the residual of averaged rows.
-    noises : tuple of two ndarrays of shape (n_joints,), N m or N
-        Noise of the torque sensor, and of positions (:func:`position_noise`).
+    noises : tuple of three ndarrays of shape (n_joints,), N m or N
+        Noise of the torque sensor, of positions, and of these in averaged rows
+        (:func:`position_noises`).
     torque : ndarray of shape (n_samples, n_joints), N m or N
         Measured torque.
     rmse : ndarray of shape (n_joints,), N m or N
@@ -127,7 +129,7 @@ def find_remainder(
     share : ndarray of shape (n_joints,)
         Share of the squared error of averaged rows that is predictable.
     """
-    (sensor, position), averaged = noises, fit.residual
+    (sensor, position, slow_position), averaged = noises, fit.residual
     noise = np.hypot(np.nan_to_num(sensor), position)
     excess = np.maximum(rmse**2 - noise**2, 0.0)
     predictable = np.sqrt(np.minimum(share * rmse**2, excess))
@@ -136,9 +138,12 @@ def find_remainder(
     material = (rmse > REMAINDER_TIMES_NOISE * noise) & (left > REMAINDER_SHARE_OF_RANGE * span)
     rows = np.array([root_mean_square(e) for e in averaged])
     inflation = variance_inflation(problem, averaged, range(len(averaged)))
-    slow = (inflation > REMAINDER_CORRELATED) & (rows > REMAINDER_SLOW_TIMES_NOISE * noise)
+    # averaged rows have the scale of white noise, which that of positions is not
+    at_rows = np.hypot(np.nan_to_num(sensor), slow_position)
+    slow = (inflation > REMAINDER_CORRELATED) & (rows > REMAINDER_SLOW_TIMES_NOISE * at_rows)
     material |= slow & (left > REMAINDER_SLOW_SHARE_OF_RANGE * span)
-    coloured = bool(material.any()) and _is_alike(rmse, noise)
+    coloured = bool(material.any()) and _is_alike(rmse, noise, COLOURED_ALIKE, COLOURED_MOST)
+    coloured &= _is_alike(rows, at_rows, SLOW_ALIKE)
     if coloured:
         material[:] = False
     material |= (predictable > noise) & (predictable > REMAINDER_PREDICTABLE_SHARE * span)
@@ -156,12 +161,12 @@ def _seldom(problem: Problem) -> NDArray[np.bool_]:
     return np.asarray(folds < SELDOM_SHARE_OF_FOLDS * problem.n_folds)
 
 
-def _is_alike(rmse: Array, noise: Array) -> bool:
+def _is_alike(errors: Array, noise: Array, factor: float, most: float = np.inf) -> bool:
     """Whether errors exceed the noise by a similar, small factor on all of several joints."""
     moves = noise > 0
-    ratio = rmse[moves] / noise[moves]
+    ratio = errors[moves] / noise[moves]
     few = moves.sum() < COLOURED_FEWEST_JOINTS
-    return not few and bool(ratio.max() < min(COLOURED_MOST, COLOURED_ALIKE * ratio.min()))
+    return not few and bool(ratio.max() < min(most, factor * ratio.min()))
 
 
 def noise_level(problem: Problem, residual: Array) -> Array:
@@ -185,8 +190,16 @@ def noise_level(problem: Problem, residual: Array) -> Array:
 def position_noise(problem: Problem, fit: Fit | None = None) -> Array:
     """Torque of a model caused by the noise of the logged positions, (n_joints,).
 
-    Without a fit, only the rigid body of the robot is used; rotors, which it does not include, may
-    cause most of this torque.
+    See :func:`position_noises`.
+    """
+    return position_noises(problem, fit)[0]
+
+
+def position_noises(problem: Problem, fit: Fit | None = None) -> tuple[Array, Array]:
+    """Torque of a model caused by the noise of the logged positions, and that in averaged rows.
+
+    Both of shape (n_joints,), N m or N. Without a fit, only the rigid body of the robot is used;
+    rotors, which it does not include, may cause most of this torque.
 
     The noise is the part that the smoother removes from the positions. The same amount, drawn at
     random, is added to the smoothed positions and propagated through the smoother and the inverse
@@ -196,14 +209,27 @@ def position_noise(problem: Problem, fit: Fit | None = None) -> Array:
     signals, motion, robot = problem.logged, problem.signals, problem.robot
     quiet = np.zeros(problem.n_joints)
     if robot is None or signals is None or motion.half_width == 0:
-        return quiet
+        return quiet, quiet
     shaken, again = signals.once(
         ("shaken motion", motion.half_width), lambda: _shaken(signals, motion)
     )
     use = shaken.usable & again.usable
     change = np.where(use, _torque(problem, fit, shaken) - _torque(problem, fit, again), 0.0)
     counts = np.maximum(use.sum(0), 1)
-    return np.asarray(np.sqrt(np.sum(change**2, axis=0) / counts))
+    return np.sqrt(np.sum(change**2, axis=0) / counts), _at_rows(problem, change)
+
+
+def _at_rows(problem: Problem, change: Array) -> Array:
+    """Root of the mean square of a torque of the first samples in averaged rows, (n_joints,)."""
+    inside, values = np.zeros((2, problem.signals.n_samples))
+    inside[: len(change)] = 1.0
+    found = np.zeros(problem.n_joints)
+    for j in range(problem.n_joints):
+        values[: len(change)] = change[:, j]
+        some = problem.rows.average(inside, j) > 0
+        if some.any():
+            found[j] = root_mean_square(problem.rows.average(values, j)[some])
+    return found
 
 
 def _shaken(logged: Signals, motion: Signals) -> tuple[Signals, Signals]:

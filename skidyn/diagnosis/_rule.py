@@ -200,6 +200,9 @@ SELDOM_SHARE_OF_FOLDS = 0.5
 #: Errors that are at most this multiple of the fast noise on every joint, and equal within this
 #: factor on all of at least this many joints, are noise that is correlated in time.
 COLOURED_MOST, COLOURED_ALIKE, COLOURED_FEWEST_JOINTS = 4.0, 1.5, 3
+#: The same factor for errors of averaged rows: a slow torque on one joint makes these unequal even
+#: where fast noise of positions is most of the error on all joints.
+SLOW_ALIKE = 2.0
 #: Share of the torque's range above which something predictable is material if it exceeds noise.
 REMAINDER_PREDICTABLE_SHARE = 0.01
 
