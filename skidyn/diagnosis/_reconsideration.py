@@ -386,8 +386,12 @@ class ReconsideringSearch(DuellingSearch):
                 break
 
     def _also(self, finding: Hypothesis, kind: str) -> Hypothesis | None:
-        """Another kind on the same joints that explains nearly as much as a finding."""
-        share = 1 - self.settings.simpler_share
+        """Another kind on the same joints that explains nearly as much as a finding.
+
+        Members of a family differ little, and are rivals of each other in any case.
+        """
+        alike = get_effect(kind).family == family_of(finding) != ""
+        share = NEARLY if alike else 1 - self.settings.simpler_share
         # a term that was found together with those of other joints was compared alone
         near = [
             h

@@ -216,7 +216,8 @@ class CouplingSpring(_PairEffect):
     of the stiffness is the same; or a distance from ``x0`` beyond which it stiffens as a hyperbolic
     sine (``stiffening``) or softens as a hyperbolic tangent (``softening``). A cable or hose that
     can only pull acts on one ``side`` of ``x0``; with ``slack``, it acts beyond this distance on
-    both sides, and with ``bent``, it has another stiffness beyond ``x0``.
+    both sides, with ``bent``, it has another stiffness beyond ``x0``, and with ``cubic``, the
+    stiffness ``k`` at ``x0`` changes with the square of the distance from there.
     """
 
     kind = "coupling_spring"
@@ -225,6 +226,7 @@ class CouplingSpring(_PairEffect):
     coefficients = (
         Coefficient("k", "N m/rad"),
         Coefficient("dk", "N m/rad"),
+        Coefficient("k3", "N m/rad^3"),
         Coefficient("tau0", "N m", is_zero=True),
     )
     shapes = (
@@ -237,6 +239,7 @@ class CouplingSpring(_PairEffect):
     )
     forms = (
         {"x0": 0.0, "power": 3.0},
+        {"x0": 0.0, "cubic": 1.0},
         {"x0": 0.0, "stiffening": 0.4},
         {"x0": 0.0, "softening": 0.4},
         {"x0": 0.0, "side": 1.0},
@@ -293,10 +296,13 @@ class CouplingSpring(_PairEffect):
             force = np.maximum(x - form["slack"], 0.0) + np.minimum(x + form["slack"], 0.0)
         elif "bent" in form:
             return np.column_stack([x, np.maximum(x, 0.0), np.ones_like(x)])
+        elif "cubic" in form:
+            return np.column_stack([x, x**3, np.ones_like(x)])
         else:
             force = np.sign(x) * np.abs(x) ** form.get("power", 1.0)
         return np.column_stack([force, np.ones_like(x)])
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
-        k, change, zero = self.coefficients
-        return (k, change, zero) if "bent" in shape else (k, zero)
+        k, change, cubic, zero = self.coefficients
+        further = {"bent": (change,), "cubic": (cubic,)}
+        return (k, *next((own for form, own in further.items() if form in shape), ()), zero)
