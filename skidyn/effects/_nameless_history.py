@@ -38,6 +38,12 @@ _TURNING = 12
 _COOLING = (0.5, 2.0, 8.0)
 
 
+def _fading_and_growing(share: Array) -> Array:
+    """Columns of a function of what has passed, as a share of the most that passes."""
+    fading = [np.exp(-share / s) for s in _FADING]
+    return np.column_stack([*fading, share, np.ones_like(share)])
+
+
 class FunctionOfTimeSinceStart(NamelessEffect):
     """A torque that fades or grows from the start of every recording."""
 
@@ -53,9 +59,7 @@ class FunctionOfTimeSinceStart(NamelessEffect):
         return [{"length": float(np.max(signals.since_start))}]
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        share = signals.since_start / max(shape["length"], 1e-9)
-        fading = [np.exp(-share / s) for s in _FADING]
-        return np.column_stack([*fading, share, np.ones_like(share)])
+        return _fading_and_growing(signals.since_start / max(shape["length"], 1e-9))
 
 
 class OscillationSinceStart(NamelessEffect):
@@ -190,6 +194,34 @@ class FunctionOfWaySinceReversal(_OfAnyJoint):
         way = np.zeros(signals.n_samples)
         way[strokes.rows] = strokes.way / signals.unit[joint]
         return _fading(way, _WAYS, signals.sign[:, joint])
+
+
+class FunctionOfWaySinceStart(_OfAnyJoint):
+    """A torque that fades or grows with the way that a joint covers in a recording.
+
+    A fresh film of grease, a rope that settles on its drum.
+    """
+
+    kind = "function_of_way_since_start"
+    title = "Function of the way since the start of a recording"
+    formula = r"f(\textstyle\int|\dot q_k|\,dt)"
+    coefficients = unnamed_coefficients(len(_FADING) + 2)
+    depends_on = ("dq_other", "time")
+
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        found = []
+        for shape in super().grid(signals, joints):
+            length = float(_way_since_start(signals, shape["other"]).max())
+            if length > 0:
+                found.append({**shape, "length": length})
+        return found
+
+    def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
+        k = int(shape["other"])
+        share = _way_since_start(signals, k) / shape["length"]
+        return signals.once(  # type: ignore[no-any-return]
+            (self.kind, k, shape["length"]), lambda: _fading_and_growing(share)
+        )
 
 
 class FunctionOfTimeSinceReversal(_OfAnyJoint):
@@ -425,6 +457,18 @@ def _time_since_reversal(signals: Signals, joint: int) -> Array:
     return since
 
 
+def _way_since_start(signals: Signals, joint: int) -> Array:
+    """Distance that a joint has covered since the start of the recording, rad or m."""
+
+    def covered() -> Array:
+        q = signals.q[:, joint]
+        way = np.cumsum(np.r_[0.0, np.where(signals.within, np.abs(np.diff(q)), 0.0)])
+        first = np.flatnonzero(np.r_[True, ~signals.within])
+        return np.asarray(way - np.repeat(way[first], np.diff(np.r_[first, len(q)])))
+
+    return signals.once(("way since start", joint), covered)  # type: ignore[no-any-return]
+
+
 def _last_reversal(signals: Signals, joint: int) -> Array:
     """Position at which a joint turned round last; that of the start before it has turned."""
     turned = np.array(signals.q[:, joint])
@@ -443,6 +487,7 @@ HISTORY: tuple[type[NamelessEffect], ...] = (
     OscillationSinceStart,
     FrictionSinceReversal,
     FunctionOfWaySinceReversal,
+    FunctionOfWaySinceStart,
     FunctionOfTimeSinceReversal,
     FunctionOfLastReversal,
     FrictionAfterMotion,

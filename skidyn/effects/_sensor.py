@@ -19,7 +19,8 @@ class TorqueGain(Effect):
 
     With a ``sign`` in its shape this holds only for positive (1) or negative torque (-1), as for a
     fault in one half of a bridge or of an amplifier. With ``over_speed`` the factor changes with
-    the speed of the joint, as where the voltage for the current is no longer sufficient.
+    the speed of the joint, as where the voltage for the current is no longer sufficient; with
+    ``over_torque`` it changes with the torque, as that of a motor whose iron saturates.
     """
 
     kind = "torque_gain"
@@ -27,9 +28,10 @@ class TorqueGain(Effect):
     title = "Torque gain"
     formula = r"\varepsilon\,\tau_\mathrm{model}"
     coefficients = (Coefficient("epsilon", "1"),)
-    #: Change of the factor per speed.
+    #: Change of the factor per speed, and per torque.
     per_speed = Coefficient("epsilon_speed", "s/rad")
-    forms = ({"sign": 1.0}, {"sign": -1.0}, {"over_speed": 1.0})
+    per_torque = Coefficient("epsilon_torque", "1/(N m)")
+    forms = ({"sign": 1.0}, {"sign": -1.0}, {"over_speed": 1.0}, {"over_torque": 1.0})
     needs = ("model_torque",)
     by_recording = True
     drifts = True
@@ -43,14 +45,19 @@ class TorqueGain(Effect):
         torque = signals.model_torque[:, [joint]]
         if "over_speed" in shape:
             return np.hstack([torque, torque * np.abs(signals.dq[:, [joint]])])
+        if "over_torque" in shape:
+            return np.hstack([torque, torque * np.abs(torque)])
         sign = shape.get("sign")
         return torque if sign is None else sign * np.maximum(0.0, sign * torque)
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
-        return (*self.coefficients, self.per_speed) if "over_speed" in shape else self.coefficients
+        changes = {"over_speed": (self.per_speed,), "over_torque": (self.per_torque,)}
+        further = next((own for form, own in changes.items() if form in shape), ())
+        return (*self.coefficients, *further)
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
-        return super().units(prismatic) | {"epsilon_speed": "s/m" if prismatic else "s/rad"}
+        speed, torque = ("s/m", "1/N") if prismatic else ("s/rad", "1/(N m)")
+        return super().units(prismatic) | {"epsilon_speed": speed, "epsilon_torque": torque}
 
 
 #: Share of a sampling step within which the values of a row may have been taken.

@@ -45,6 +45,7 @@ FORMS = {
         {"dq2", "time"},
         None,
     ),
+    "settles with the way": (1, 0.8, lambda x: np.exp(-_way(x, "dq2")), {"dq2", "time"}, None),
     "bump": (2, 1.2, lambda x: np.exp(-((x["q2"] / 0.15) ** 2)), {"q2"}, None),
 }
 #: Forms for which the signals are chosen among those of six joints.
@@ -59,6 +60,7 @@ TOGETHER = [
     ("remembers a reversal",),
     ("remembers motion",),
     ("drags less and less",),
+    ("settles with the way",),
     pytest.param(("pushes during motion",), marks=pytest.mark.slow),
 ]
 LENGTH = {"n_trajectories": 6, "duration": 6.0}
@@ -86,6 +88,12 @@ def _warmed(x, name, time_constant):
             now = heat[rows[i - 1]]
             heat[rows[i]] = now + (t[i] - t[i - 1]) / time_constant * (power[i] - now)
     return heat
+
+
+def _way(x, name):
+    """Distance since the start of the recording."""
+    step = (x[name].abs() * x["time"].diff()).where(x["trajectory"].diff() == 0, 0.0)
+    return step.groupby(x["trajectory"]).cumsum()
 
 
 def _last_turn(x, name):

@@ -73,3 +73,14 @@ def test_a_gain_may_change_with_the_speed(signals):
     np.testing.assert_allclose(found, factor * signals.model_torque[:, 1])
     names = [c.name for c in effect.coefficients_of({"over_speed": 1.0})]
     assert [effect.units()[name] for name in names] == ["1", "s/rad"]
+
+
+def test_a_gain_may_change_with_the_torque(signals):
+    effect = get_effect("torque_gain")
+
+    found = effect.columns(signals, 1, over_torque=1.0) @ [0.1, -0.02]
+
+    torque = signals.model_torque[:, 1]
+    np.testing.assert_allclose(found, (0.1 - 0.02 * np.abs(torque)) * torque)
+    names = [c.name for c in effect.coefficients_of({"over_torque": 1.0})]
+    assert [effect.units()[name] for name in names] == ["1", "1/(N m)"]
