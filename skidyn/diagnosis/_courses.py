@@ -64,14 +64,18 @@ def course_candidates(
     scan = PartScan(tester)
     found: dict[str, list[Candidate]] = {}
     drifting = [kind for kind in kinds if get_effect(kind).drifts]
-    for whole in filter(among, everywhere(problem, drifting)):
+    wholes = list(filter(among, everywhere(problem, drifting)))
+    parts = [scan.parts([whole])[0] for whole in wholes]
+    loads = [whole.term.effect.search == "trajectories" for whole in wholes]
+    # a load that some recordings carry; which they are may show for another kind of load only
+    carried = {p.recordings for p, load in zip(parts, loads, strict=True) if load and p is not None}
+    for whole, part, is_load in zip(wholes, parts, loads, strict=True):
         constant = tester.estimate(whole.rows)[1]
         tried = [(over, names)] * (len(names) > 1) + [(within, names)]
-        (part,) = scan.parts([whole])
         if part is not None:
             constant = max(constant, part.drop)
-            if whole.term.effect.search == "trajectories":  # a load that some recordings carry
-                tried.append((within, part.recordings))
+        if is_load:
+            tried += [(within, own) for own in sorted(carried)]
         fits = [(*course.fitted(tester, whole, own), course, own) for course, own in tried]
         drop, sizes, course, own = max(fits, key=lambda fit: fit[0])
         if drop < constant + least:
