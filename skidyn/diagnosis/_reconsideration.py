@@ -74,19 +74,22 @@ class ReconsideringSearch(DuellingSearch):
         """The first of two known effects of which neither is significant without the other.
 
         On joints with an error far above the noise, of which each of the two leaves so much that it
-        hides the other.
+        hides the other. Beside a finding, two others would take what its formula leaves.
         """
         if self._reconsidering or not self.nameless:
             return None
         best: Hypothesis | None = None
         highest = 0.0
+        taken = {j for h in (*self.earlier, *self.findings) for c in h.candidates for j in c.rows}
         for j in self._far_above_noise():
+            if j in taken:
+                continue
             for name in self._strongest_on((j,)):
                 second = self._second_beside(name, (j,))
                 if second is None or name.score + second.score <= highest:
                     continue
                 judged = self.judged(name, second.candidates)
-                if judged is not None:
+                if judged is not None and not self.due_to_positions(judged):
                     best, highest = judged, name.score + second.score
         return None if best is None else ranked_with(best, offered)
 

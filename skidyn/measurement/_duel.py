@@ -203,7 +203,7 @@ def _likely(
             for columns in _shapes(effect, bodies, joints, rows)
         ]
         if tried:
-            gain, columns = max(tried, key=lambda pair: pair[0])
+            gain, columns = max(tried, key=lambda pair: pair[0] - COST * pair[1].count)
             zeros = sum(c.is_zero for c in effect.coefficients)
             counted = columns.count - zeros
             counted += sum(s.name not in effect.form_names for s in effect.shapes)
