@@ -61,7 +61,7 @@ COLOURED, LEAST, ENOUGH = 1.7, 0.003, 0.3
 #: separate from another); and that of one that the data cannot separate from another. Of 177 of
 #: these with a score of .88, in fourteen collections of logs, 175 were right, since the simpler of
 #: the two was named.
-MOST, MOST_IN_DOUBT, MOST_WITH_RIVAL = 0.98, 0.88, 0.93
+MOST, MOST_IN_DOUBT, MOST_WITH_RIVAL = 0.98, 0.88, 0.95
 #: The logit of the confidence in a known effect that fits is this constant plus this multiple of
 #: the logit of its score. Of 629 of them in fourteen collections of logs (versions 34 to 38), .82
 #: of those with a score below .60 were right, .90 up to .75, .88 up to .88, .96 up to .97, and .99
@@ -130,7 +130,7 @@ def confidence(
     Returns
     -------
     float
-        At most 0.98; 0.93 if a rival explains the data as well; 0.88 for an unknown effect, for one
+        At most 0.98; 0.95 if a rival explains the data as well; 0.88 for an unknown effect, for one
         that changes or that the changed formula of another finding would explain, or if most of
         the error remains.
     """

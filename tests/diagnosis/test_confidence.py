@@ -45,7 +45,9 @@ def test_an_equal_explanation_lowers_it():
 
 
 def test_a_name_that_the_data_hardly_separates_from_another_is_less_sure():
-    assert confidence(0.08, 1.0, 0.3) > 0.94 > confidence(0.08, 1.0, 0.3, rivalled=True, lead=100.0)
+    assert (
+        confidence(0.08, 1.0, 0.3) > 0.95 >= confidence(0.08, 1.0, 0.3, rivalled=True, lead=100.0)
+    )
 
 
 def test_that_something_has_no_name_is_less_sure():
