@@ -248,12 +248,13 @@ def slight(
         Error of every joint with all findings, N m or N.
     """
     remarks = {}
+    signals = problem.signals if problem.logged is None else problem.logged
     for i, hypothesis in enumerate(findings):
         reasons = []
         for candidate in hypothesis.candidates:
             told = intervals[candidate.term]
             found = {name: v for name, v in told.items() if isinstance(v, tuple)}
-            reasons.append(candidate.term.effect.too_small(found, problem.signals))
+            reasons.append(candidate.term.effect.too_small(found, signals))
         where = joints_told(j + 1 for j in hypothesis.joints)
         if is_vibration(hypothesis) and _in_the_noise(hypothesis, errors):
             lines = {f"{c.term.shape['frequency']:.3g}" for c in hypothesis.candidates}

@@ -354,7 +354,7 @@ class Effect:
         intervals : mapping of str to (float, float, float)
             Identified physical parameters, with the ends of their intervals.
         signals : Signals
-            Motion on which they were found.
+            Logged motion.
 
         Returns
         -------

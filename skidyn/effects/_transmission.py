@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from skidyn._sensor_steps import position_step
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Effect
 from skidyn.effects._derivatives import smooth_derivatives
@@ -398,6 +399,18 @@ class Backlash(_LinkSideEffect):
     rivals = ("joint_elasticity", "dahl")
     separating_motion = "slow motion through poses in which the load changes sign"
     reference = "Nordin, Gutman (2002), Automatica 38(10), 1633-1649."
+
+    def too_small(
+        self, intervals: Mapping[str, tuple[float, float, float]], signals: Signals
+    ) -> str | None:
+        gap = intervals["gap"][0]
+        steps = [step for step in map(position_step, signals.q.T) if step > gap]
+        if len(steps) < signals.n_joints:  # a finer sensor, or one without visible steps
+            return None
+        return (
+            f"a play of {gap:.2g} rad is less than a step of the position sensors, "
+            f"{min(steps):.2g} rad, whose rounding looks like it"
+        )
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
         assert signals.load is not None

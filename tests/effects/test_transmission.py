@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.effects import Term, get_effect, list_effects, nameless_kinds
+from skidyn.effects import Signals, Term, get_effect, list_effects, nameless_kinds
 
 
 def test_derivatives_of_a_swing_are_those_of_its_way_up_to_fast_swings(signals):
@@ -96,3 +96,15 @@ def test_noise_of_the_acceleration_reaches_all_joints_and_leaves_the_motion_alon
 def test_a_swing_asks_for_motion_as_fast_as_itself_and_a_spring_for_none():
     assert get_effect("joint_elasticity").fastest({"resonance": 12.0}) == 12.0
     assert get_effect("spring").fastest({}) == 0.0
+
+
+def test_a_play_below_the_steps_of_the_sensors_is_a_remark():
+    rng = np.random.default_rng(0)
+    q = np.round(rng.uniform(-1, 1, (500, 2)) / 2e-3) * 2e-3
+    signals = Signals(q, q, q, trajectory=np.zeros(500, dtype=int))
+    backlash = get_effect("backlash")
+
+    assert "less than a step" in backlash.too_small({"gap": (1e-3, 8e-4, 1.2e-3)}, signals)
+    assert backlash.too_small({"gap": (3e-3, 2e-3, 4e-3)}, signals) is None
+    fine = signals.with_(q=rng.uniform(-1, 1, (500, 2)))
+    assert backlash.too_small({"gap": (1e-3, 8e-4, 1.2e-3)}, fine) is None
