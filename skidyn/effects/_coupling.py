@@ -217,7 +217,7 @@ class CouplingSpring(_PairEffect):
     sine (``stiffening``) or softens as a hyperbolic tangent (``softening``). A cable or hose that
     can only pull acts on one ``side`` of ``x0``; with ``slack``, it acts beyond this distance on
     both sides, with ``bent``, it has another stiffness beyond ``x0``, and with ``cubic``, the
-    stiffness ``k`` at ``x0`` changes with the square of the distance from there.
+    stiffness ``k`` at ``x0`` grows with the square of the distance from there.
     """
 
     kind = "coupling_spring"
@@ -226,7 +226,7 @@ class CouplingSpring(_PairEffect):
     coefficients = (
         Coefficient("k", "N m/rad"),
         Coefficient("dk", "N m/rad"),
-        Coefficient("k3", "N m/rad^3"),
+        Coefficient("k3", "N m/rad^3", sign=1),  # what softens, as a cosine, has forms of its own
         Coefficient("tau0", "N m", is_zero=True),
     )
     shapes = (
