@@ -101,7 +101,6 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     numbers, fold = np.unique(problem.fold[joint][::step], return_inverse=True)
     if len(numbers) < 4:
         return Followed([], [], [], changing, [], [])
-    others = {name: x for name, x in signals.items() if name != f"dq{joint + 1}"}
     nearest = _nearest(joint, range(problem.n_joints))
     close = {name: x for name, x in signals.items() if _joint_of(name) in nearest}
     if problem.signals.time is not None and len(rows.recordings) > 2:
@@ -119,7 +118,10 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
     loaded = []
     if problem.robot is not None and problem.signals.load is not None:
         load = average_at_rows(problem, joint, problem.signals.load[:, joint])[::step]
-        one = product_with_load(others, load, y, fold)  # friction under load has a name
+        # friction under load, and a gain that drifts, are in the catalogue
+        named = {f"dq{joint + 1}", "since_start"}
+        others = {name: x for name, x in signals.items() if name not in named}
+        one = product_with_load(others, load, y, fold)
         loaded = [] if one is None else [one]
     turning = np.flatnonzero(~problem.signals.prismatic).tolist()
     positions = {k: signals[f"q{k + 1}"] for k in sorted(_nearest(joint, turning))}

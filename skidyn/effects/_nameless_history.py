@@ -217,11 +217,12 @@ class FunctionOfWaySinceStart(_OfAnyJoint):
         return found
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        k = int(shape["other"])
-        share = _way_since_start(signals, k) / shape["length"]
-        return signals.once(  # type: ignore[no-any-return]
-            (self.kind, k, shape["length"]), lambda: _fading_and_growing(share)
+        k, length = int(shape["other"]), shape["length"]
+        columns: Array = signals.once(
+            (self.kind, k, length),
+            lambda: _fading_and_growing(_way_since_start(signals, k) / length),
         )
+        return columns
 
 
 class FunctionOfTimeSinceReversal(_OfAnyJoint):

@@ -408,8 +408,8 @@ class Backlash(_LinkSideEffect):
         if len(steps) < signals.n_joints:  # a finer sensor, or one without visible steps
             return None
         return (
-            f"a play of {gap:.2g} rad is less than a step of the position sensors, "
-            f"{min(steps):.2g} rad, whose rounding looks like it"
+            f"the play is less than a step of the position sensors ({gap / min(steps):.2g} of the "
+            "smallest), whose rounding looks like it"
         )
 
     def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
