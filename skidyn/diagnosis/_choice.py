@@ -98,7 +98,7 @@ class ChoosingSearch(RankingSearch):
             return best
         (own,) = best.candidates
         size, _ = self.tester(self.chosen).estimate(own.rows)
-        kind = own.term.effect.usually(size, own.term.shape, self.problem.few)
+        kind = own.term.effect.usually(size, own.term.shape, self.problem.few, own.joints)
         least = (1 - self.settings.simpler_share) * best.score
         when = own.term.trajectories
         near = [h for h in ranking if h.kind == kind and h.score >= least]

@@ -61,7 +61,8 @@ class DuellingSearch(JudgingSearch):
                 continue
             margin = margin_over(own, rivals_among(own, ranking))
             compared = ranked_with(replace(own, margin=margin), ranking)
-            if other.kind == best.kind or (apart and not self._explains_more(other, own)):
+            alike = apart and self.same_design(candidate, best.candidates)
+            if other.kind == best.kind or (alike and not self._explains_more(other, own)):
                 kept.append(candidate)
                 alone.append(compared)
             else:
@@ -71,6 +72,20 @@ class DuellingSearch(JudgingSearch):
         if lost:
             best = self._of_terms(best, kept)
         return replace(best, alone=tuple(alone))
+
+    def same_design(self, candidate: Candidate, others: Sequence[Candidate]) -> bool:
+        """Whether some of the others acts on another joint of the same type, as it turns or slides.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            Term of a joint.
+        others : sequence of Candidate
+            Terms of joints.
+        """
+        slides = self.problem.signals.prismatic
+        (own,) = {bool(slides[j]) for j in candidate.joints}
+        return any(slides[j] == own for c in others for j in set(c.joints) - set(candidate.joints))
 
     def _explains_more(self, other: Hypothesis, own: Hypothesis) -> bool:
         """Whether another effect on a joint is better than one that is found on others, too."""

@@ -392,7 +392,7 @@ class RankingSearch(LineSearch):
         pool = [c for c in self.pool if c.term.effect.comes_and_goes and not some_recordings(c)]
         # where friction has changed already, it has changed again
         changed = {c.joints for c in self.chosen if c.kind == DRIFT and some_recordings(c)}
-        pool += own_effects(self.problem, self.kinds)
+        pool += own_effects(self.problem, self.kinds, self.terms)
         pool = [c for c in pool if c.kind not in FRICTION or c.joints not in changed]
         pool = list(filter(self.looked.may_find("parts"), pool))
         found, joints = part_candidates(pool, tester, self.significant, refined, least)

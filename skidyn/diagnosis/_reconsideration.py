@@ -16,6 +16,7 @@ from skidyn.diagnosis._hypothesis import (
     Hypothesis,
     close_shapes,
     family_of,
+    grouped_by_joints,
     margin_over,
     on_single_joints,
     ranked_with,
@@ -25,9 +26,11 @@ from skidyn.diagnosis._hypothesis import (
     within_recordings,
 )
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
+from skidyn.diagnosis._recordings import FRICTION
 from skidyn.diagnosis._remainder import noise_level
 from skidyn.diagnosis._rule import BETWEEN, NEARLY, REMAINDER_TIMES_NOISE
 from skidyn.diagnosis._search_state import still_free
+from skidyn.diagnosis._split import recordings_with
 from skidyn.effects import Term, get_effect
 
 
@@ -47,7 +50,9 @@ class ReconsideringSearch(DuellingSearch):
             forces = [j for j in best.joints if self.of_one_position(best, j)]
             if traced & (set(best.joints) - set(forces)):
                 continue  # another, weaker trace of the same force
-            best, beside = self._first_of_two_names(best, offered)
+            best, beside = self._plain_first(best)
+            if not beside:
+                best, beside = self._first_of_two_names(best, offered)
             simpler = self._at_its_limit(best)
             judged = None if simpler is None else self.judged(simpler, beside)
             if judged is not None and self.due_to_positions(judged):
@@ -110,6 +115,23 @@ class ReconsideringSearch(DuellingSearch):
         judged = [h for h in map(self.judged, names) if h is not None]
         self._restore(kept)
         return max(judged, key=lambda h: h.score, default=None)
+
+    def _plain_first(self, best: Hypothesis) -> tuple[Hypothesis, Sequence[Candidate]]:
+        """Friction that the model lacks and that changes, instead of a size for each recording.
+
+        With the terms of the change, beside which the plain friction has to be significant: with
+        one size in all recordings, it leaves more than it removes in some of them.
+        """
+        names, own = self.problem.rows.recordings, grouped_by_joints(best.candidates)
+        if best.kind not in FRICTION or not all(
+            len(some) > 1 and recordings_with(best.kind, some, names).all() for some in own
+        ):
+            return best, ()
+        joints = {some[0].joints for some in own}
+        plain = [c for c in self.pool if c.kind == best.kind and c.joints in joints]
+        first = self._final(plain, refined=False) if plain else None
+        second = None if first is None else self._second_beside(first, first.joints)
+        return (best, ()) if first is None or second is None else (first, second.candidates)
 
     def _offset_later(self, step: Hypothesis) -> Hypothesis:
         """A step in time between two recordings, as an offset of the later ones."""
@@ -370,6 +392,8 @@ class ReconsideringSearch(DuellingSearch):
                     continue
                 both = self._also(other, old.kind) is not None
                 if set(old.joints) & set(other.joints) or (both and old.score > other.score):
+                    continue
+                if not all(self.same_design(c, other.candidates) for c in old.candidates):
                     continue
                 same = self._also(old, other.kind)
                 if same is None or same.kind == old.kind:

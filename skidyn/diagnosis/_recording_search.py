@@ -51,7 +51,7 @@ class RecordingSearch(SearchState):
         few, drift, many = [], [], []
         for part in grouped_by_joints(chosen):
             named = len(part) <= most or self._price(part) <= white or self._leaves_little(part)
-            changes = drifting(self.problem, self.kinds, part) if named else []
+            changes = drifting(self.problem, self.kinds, part, self.terms) if named else []
             drift += changes
             few += part if named and not changes else []
             many += [] if named else part

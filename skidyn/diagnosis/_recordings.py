@@ -146,7 +146,7 @@ def every_recording(problem: Problem, kinds: Iterable[str]) -> list[list[Candida
     return found
 
 
-def own_effects(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
+def own_effects(problem: Problem, kinds: Iterable[str], found: Iterable[Term] = ()) -> list[Candidate]:
     """Friction and offsets of the given model, which may differ in a part of the recordings.
 
     Each kind by itself, and the friction of a joint together as friction of another level.
@@ -159,13 +159,15 @@ def own_effects(problem: Problem, kinds: Iterable[str]) -> list[Candidate]:
         Kinds to try.
     """
     tried = set(kinds)
-    own = {*FRICTION, "offset"} & tried
-    terms = [t for t in problem.terms if t.kind in own and not t.is_open]
-    terms += _other_levels(problem, tried, range(problem.n_joints))
+    own, known = {*FRICTION, "offset"} & tried, [*problem.terms, *found]
+    terms = [t for t in known if t.kind in own and not t.is_open and t.trajectories is None]
+    terms += _other_levels(problem, tried, range(problem.n_joints), known)
     return [Candidate(term.kind, term, problem.term_rows(term)) for term in terms]
 
 
-def drifting(problem: Problem, kinds: Iterable[str], same: Sequence[Candidate]) -> list[Candidate]:
+def drifting(
+    problem: Problem, kinds: Iterable[str], same: Sequence[Candidate], known: Sequence[Term]
+) -> list[Candidate]:
     """Friction of a joint with several sizes in different recordings, as friction that drifts.
 
     Parameters
@@ -185,14 +187,16 @@ def drifting(problem: Problem, kinds: Iterable[str], same: Sequence[Candidate]) 
     if len(same) < 2 or same[0].kind not in FRICTION:
         return []
     found = []
-    for whole in _other_levels(problem, set(kinds), same[0].joints):
+    for whole in _other_levels(problem, set(kinds), same[0].joints, known):
         found += _in_groups(problem, whole, (c.term.trajectories or () for c in same))
     return found
 
 
-def _other_levels(problem: Problem, kinds: set[str], joints: Iterable[int]) -> list[Term]:
+def _other_levels(
+    problem: Problem, kinds: set[str], joints: Iterable[int], known: Iterable[Term]
+) -> list[Term]:
     """Other levels of the whole friction of joints that is in the model."""
-    own = {(t.kind, t.places) for t in problem.terms if t.kind in FRICTION}
+    own = {(t.kind, t.places) for t in known if t.kind in FRICTION and t.trajectories is None}
     if DRIFT not in kinds:
         return []
     return [

@@ -23,7 +23,7 @@ from skidyn.diagnosis._profile import profile_error
 from skidyn.diagnosis._recordings import recording_candidates
 from skidyn.diagnosis._rule import CONFINED, Settings, false_discovery_rate
 from skidyn.diagnosis._tester import Tester
-from skidyn.effects import Term
+from skidyn.effects import Term, TermSum
 from skidyn.evidence import Problem
 
 
@@ -92,6 +92,11 @@ class SearchState:
         return target
 
     @property
+    def terms(self) -> TermSum:
+        """Terms of the present model."""
+        return self.problem.terms + (c.term for c in self.chosen)
+
+    @property
     def blocks(self) -> list[dict[int, Array]]:
         """Columns of the present model."""
         return self.blocks_with(self.chosen)
@@ -103,8 +108,7 @@ class SearchState:
 
     def refit(self) -> None:
         problem = replace_torque(self.problem, self.problem.torque - self.ripple)
-        terms = (*self.problem.terms, *(c.term for c in self.chosen))
-        self.fit = problem.fit(terms, sigma=self.fit.noise)
+        self.fit = problem.fit(self.terms, sigma=self.fit.noise)
         if not any(uses_the_fit(c) for c in self.chosen):
             return
         # Their columns were computed with the model without them, which was biased by their
@@ -113,7 +117,7 @@ class SearchState:
             before = self.fit.noise
             self.renew(self.chosen)
             problem = replace_torque(self.problem, self.problem.torque - self.ripple)
-            self.fit = problem.fit(terms, sigma=before)
+            self.fit = problem.fit(self.terms, sigma=before)
             if np.allclose(self.fit.noise, before, rtol=0.01):
                 break
 
@@ -126,8 +130,7 @@ class SearchState:
     def weights(self) -> Array:
         """Noise by which joints are weighted in tests: that of the fit, or of each joint alone."""
         problem = replace_torque(self.problem, self.problem.torque - self.ripple)
-        terms = (*self.problem.terms, *(c.term for c in self.chosen))
-        return np.minimum(self.fit.noise, problem.own_noise(terms))
+        return np.minimum(self.fit.noise, problem.own_noise(self.terms))
 
     @property
     def _round(self) -> str:
@@ -162,7 +165,7 @@ class SearchState:
     @property
     def residual(self) -> Array:
         """Residual of the present model at every sample, shape (n_samples, n_joints)."""
-        fit = replace(self.fit, terms=self.problem.terms + (c.term for c in self.chosen))
+        fit = replace(self.fit, terms=self.terms)
         return self.problem.torque - self.ripple - self.problem.explained(fit)
 
     def follow_fit(self) -> None:
@@ -231,8 +234,7 @@ class SearchState:
         """Tests on the log as it would be if the present model lacked nothing."""
 
         def make() -> Tester:
-            terms = self.problem.terms + (c.term for c in self.chosen)
-            imitated = imitate(self.problem, replace(self.fit, terms=terms))
+            imitated = imitate(self.problem, replace(self.fit, terms=self.terms))
             blocks = [imitated.term_rows(term) for term in imitated.terms]
             return Tester(imitated, blocks, self.sigma, imitated.target)
 

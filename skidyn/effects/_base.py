@@ -283,7 +283,11 @@ class Effect:
         return True
 
     def usually(
-        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals
+        self,
+        coefficients: Array,
+        shape: Mapping[str, Any],
+        signals: Signals,
+        joints: Sequence[int],
     ) -> str | None:
         """Kind that an effect with such coefficients usually is, if that is nearly as good.
 
@@ -295,6 +299,8 @@ class Effect:
             Shape parameters.
         signals : Signals
             Motion and robot.
+        joints : sequence of int
+            Its joints, from 0.
 
         Returns
         -------

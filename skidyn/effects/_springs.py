@@ -17,6 +17,8 @@ FEWEST_TOUCHING, MOST_TOUCHING = 0.001, 0.6
 #: A piece over a smaller share of the travel is a step of the torque and not a spring; a spring
 #: whose rest position is closer to an end of the travel than this share is a stop.
 NARROW, ONE_SIDED = 0.1, 0.15
+#: Least share of the motion of a vertical slide that is vertical.
+_VERTICAL = 0.99
 
 
 def stiffens(distance: Array, scale: float) -> bool:
@@ -339,6 +341,22 @@ class EndStop(Effect):
             return FEWEST_TOUCHING < beyond < MOST_TOUCHING
         below = float(np.mean(q < shape["q_low"]))
         return min(beyond, below) > FEWEST_TOUCHING and beyond + below < MOST_TOUCHING
+
+    def usually(
+        self,
+        coefficients: Array,
+        shape: Mapping[str, Any],
+        signals: Signals,
+        joints: Sequence[int],
+    ) -> str | None:
+        # What stops a vertical slide on its way down is more often a table than its lower end.
+        robot, (joint,) = signals.robot, joints
+        if robot is None or not signals.prismatic[joint] or "q_low" in shape:
+            return None
+        up = -robot.gravity / max(float(np.linalg.norm(robot.gravity)), np.finfo(float).tiny)
+        rise = robot.jacobian(signals.q)[:, :3, joint] @ up
+        is_lowered = bool((shape["side"] * rise < -_VERTICAL).all())
+        return "environment_contact" if is_lowered else None
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         q, dq = signals.q[:, joint], signals.dq[:, joint]

@@ -252,7 +252,11 @@ class ExternalWrench(_ToolEffect):
         return "arm" not in shape or not _is_vertical(coefficients[:3], signals)
 
     def usually(
-        self, coefficients: Array, shape: Mapping[str, Any], signals: Signals
+        self,
+        coefficients: Array,
+        shape: Mapping[str, Any],
+        signals: Signals,
+        joints: Sequence[int],
     ) -> str | None:
         assert signals.robot is not None
         if "on_tool" in shape or not _is_vertical(coefficients[:3], signals):

@@ -227,7 +227,7 @@ def test_a_weight_on_a_point_that_turns_with_the_tool_is_a_payload_and_no_force(
     assert can_be([0.1, 0.0, -4.0])
 
     def usually(force, **shape):
-        return effect.usually(np.array(force), shape, signals)
+        return effect.usually(np.array(force), shape, signals, [0])
 
     assert usually([0.1, 0.0, -4.0]) == "payload"
     assert usually([0.1, 0.0, 4.0]) is usually([2.0, 0.0, -4.0]) is None
