@@ -37,6 +37,7 @@ from skidyn.diagnosis._hypothesis import (
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._judged import Judged, worth_their_terms
 from skidyn.diagnosis._limits import Limit
+from skidyn.diagnosis._noise import noise_of_recordings
 from skidyn.diagnosis._remainder import (
     Remainder,
     find_remainder,
@@ -199,12 +200,14 @@ def _in_time(
     taken.update(j for t in inexact for j in problem.term_rows(t))
     held = [np.inf if j in taken else EPISODE_LEAST_HELD for j in range(problem.n_joints)]
     share_held = np.array(held)
-    episodes, inside = find_episodes(problem, smooth, least, share_held)
+    residual = problem.torque - result.ripple - problem.explained(result.fit)
+    loud = noise_of_recordings(problem.signals, residual)
+    episodes, inside = find_episodes(problem, smooth, least, share_held, loud)
     if episodes:
         real = not_of_positions(problem, result.fit, smooth, inside)
         if not real.all():
             share_held = np.where(real, share_held, np.inf)
-            episodes, inside = find_episodes(problem, smooth, least, share_held)
+            episodes, inside = find_episodes(problem, smooth, least, share_held, loud)
     if episodes:
         findings.append(_episodic(episodes, inside, result.fit.residual))
         taken.update(j - 1 for e in episodes for j in e.joints)

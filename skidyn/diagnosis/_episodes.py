@@ -2,8 +2,8 @@
 """Intermittent torques: a push, a drag, a collision.
 
 No function of the motion describes them, and they do not affect a robust measure of the residual.
-An episode is a run of rows whose squared residual, in units of the noise of the quiet rows, exceeds
-that of noise; the run with the largest sum of the excess is found first (the maximum-sum interval),
+An episode is a run of rows whose squared residual, in units of the noise of the quiet rows (and of
+that of its own recording, where this is larger), exceeds that of noise; the run with the largest sum of the excess is found first (the maximum-sum interval),
 then the next, until the sum is that of noise.
 """
 
@@ -87,7 +87,11 @@ class Episode:
 
 
 def find_episodes(
-    problem: Problem, residual: Sequence[Array], least: Array, share: Array
+    problem: Problem,
+    residual: Sequence[Array],
+    least: Array,
+    share: Array,
+    loud: Mapping[int, Array],
 ) -> tuple[list[Episode], list[NDArray[np.bool_]]]:
     """Episodes in the residual of a model.
 
@@ -101,6 +105,9 @@ def find_episodes(
         Torque that an episode must reach, N m or N.
     share : ndarray of shape (n_joints,)
         Share of the squared residual that the episodes of a joint must contain.
+    loud : mapping of int to ndarray of shape (n_joints,)
+        Noise of every recording, in units of that of the typical one
+        (:func:`~skidyn.diagnosis._noise.noise_of_recordings`).
 
     Returns
     -------
@@ -112,7 +119,7 @@ def find_episodes(
     spans: list[tuple[int, float, float, int]] = []
     inside = []
     for j, r in enumerate(residual):
-        chosen = _rows_of_episodes(problem, j, r, float(least[j]), float(share[j]))
+        chosen = _rows_of_episodes(problem, j, r, float(least[j]), float(share[j]), loud)
         inside.append(chosen)
         spans += [(k, a, b, j) for k, a, b in _spans(problem, j, chosen)]
     episodes = []
@@ -207,7 +214,12 @@ def away_from_reversals(
 
 
 def _rows_of_episodes(
-    problem: Problem, joint: int, residual: Array, least: float, share: float
+    problem: Problem,
+    joint: int,
+    residual: Array,
+    least: float,
+    share: float,
+    loud: Mapping[int, Array],
 ) -> NDArray[np.bool_]:
     """Rows of a joint in its episodes; none if they are too many for an intermittent torque."""
     chosen = np.zeros(len(residual), dtype=bool)
@@ -216,7 +228,8 @@ def _rows_of_episodes(
     quiet = float(np.median(np.abs(residual))) / MEDIAN
     if quiet <= 0:
         return chosen
-    excess = (residual / quiet) ** 2 - EPISODE_EXCESS
+    noise = quiet * np.array([loud[k][joint] for k in problem.rows.trajectory[joint].tolist()])
+    excess = (residual / noise) ** 2 - EPISODE_EXCESS
     weight = problem.rows.average(np.ones(problem.signals.n_samples), joint)
     for order in _runs(problem, joint):
         _take(excess[order], order, chosen)

@@ -14,6 +14,8 @@ from sample to sample; its noise is at least the error of rounding to these step
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from skidyn._sensor_steps import position_step
@@ -95,13 +97,48 @@ def sensor_noise(signals: Signals, residual: Array, torque: Array | None) -> Arr
     return np.asarray(np.maximum(size, [_rounding(channel) for channel in looked_at.T]))
 
 
+def noise_of_recordings(signals: Signals, residual: Array) -> dict[int, Array]:
+    """Fast noise of every recording, in units of that of the typical one, and at least 1.
+
+    Fast motion, and what shakes an encoder, make noise in some recordings only.
+
+    Parameters
+    ----------
+    signals : Signals
+        Motion, with its segments.
+    residual : ndarray of shape (n_samples, n_joints), N m or N
+        Residual of a model.
+
+    Returns
+    -------
+    dict of int to ndarray of shape (n_joints,)
+        By the number of the recording.
+    """
+    own: dict[int, list[slice]] = {}
+    for rows in signals.segments:
+        own.setdefault(int(signals.trajectory[rows.start]), []).append(rows)
+    names, parts = list(own), list(own.values())
+    sizes = np.array([_differences_within(some, residual, 1) for some in parts])
+    known = np.isfinite(sizes)
+    typical = np.array(
+        [np.median(x[k]) if k.any() else 0.0 for x, k in zip(sizes.T, known.T, strict=True)]
+    )
+    typical = np.where(typical > 0, typical, np.inf)
+    loud = np.maximum(1.0, np.where(known, sizes, 0.0) / typical)
+    return dict(zip(names, loud, strict=True))
+
+
 def _differences(signals: Signals, residual: Array, distance: int) -> Array:
+    return _differences_within(signals.segments, residual, distance)
+
+
+def _differences_within(segments: Iterable[slice], residual: Array, distance: int) -> Array:
     """Standard deviation of white noise with the third differences of samples so far apart.
 
     Shape (n_joints,), N m or N; NaN without any.
     """
     parts = []
-    for rows in signals.segments:
+    for rows in segments:
         if rows.stop - rows.start > 3 * distance:
             apart = residual[rows]
             for _ in range(3):
