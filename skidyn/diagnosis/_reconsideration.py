@@ -165,9 +165,12 @@ class ReconsideringSearch(DuellingSearch):
             or best.errors is None
             or within_recordings(best)
             or self._reconsidering
-            # one force over the position of a joint is simpler than two that add up to it
-            or all(self.of_one_position(best, j) for j in best.joints)
         ):
+            return best, ()
+        if (name := self._beside_earlier(best, ranking)) is not None:
+            return name, ()
+        # one force over the position of a joint is simpler than two that add up to it
+        if all(self.of_one_position(best, j) for j in best.joints):
             return best, ()
         tried = set()
         for rival in self._names_on(best, ranking):
@@ -182,6 +185,35 @@ class ReconsideringSearch(DuellingSearch):
             if second is not None and self.judged(rival, second.candidates) is not None:
                 return rival, second.candidates
         return best, ()
+
+    def _beside_earlier(
+        self, function: Hypothesis, ranking: list[Hypothesis]
+    ) -> Hypothesis | None:
+        """A known effect as good as a function once an earlier finding has its shape beside it.
+
+        The first of two effects of a joint was fitted to both, so that it leaves to a function what
+        neither of them does.
+        """
+        own = set(function.joints)
+        if not any(h.kind != UNKNOWN and own & set(h.joints) for h in self.findings):
+            return None
+        assert function.errors is not None
+        left = function.errors.sum(0)
+        removed = left * np.expm1(np.maximum(function.gain, 0) / self._counts)
+        for rival in self._names_on(function, ranking):
+            first = self.judged(rival)
+            if first is None:
+                continue
+            kept = self._state()
+            self.add(first)
+            self.refit()
+            self.sigma, self.left = self.weights(), self._left()
+            self.reconsider(self._settled(first))
+            as_good = self._good_enough(self.left, left, removed, function.joints)
+            self._restore(kept)
+            if as_good:
+                return rival
+        return None
 
     def _second_name(self, first: Hypothesis, function: Hypothesis) -> Hypothesis | None:
         """A known effect that together with a first one is as good as a function."""
