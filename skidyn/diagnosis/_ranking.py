@@ -39,7 +39,7 @@ from skidyn.diagnosis._screen import Model, Screen
 from skidyn.diagnosis._spans import FOLLOWS_ANY, span_candidates
 from skidyn.diagnosis._split import prepare_splits, recordings_with, split_effects
 from skidyn.diagnosis._tester import Tester
-from skidyn.effects import SizeByRecording, get_effect
+from skidyn.effects import FunctionOfSignals, SizeByRecording, Term, get_effect
 
 Mask = NDArray[np.bool_]
 #: Indices in the pool of the added candidates, and the reduction of the held-out error.
@@ -394,9 +394,27 @@ class RankingSearch(LineSearch):
         changed = {c.joints for c in self.chosen if c.kind == DRIFT and some_recordings(c)}
         pool += own_effects(self.problem, self.kinds, self.terms)
         pool = [c for c in pool if c.kind not in FRICTION or c.joints not in changed]
-        pool = list(filter(self.looked.may_find("parts"), pool))
-        found, joints = part_candidates(pool, tester, self.significant, refined, least)
+        found, joints = list[list[Candidate]](), set[int]()
+        for some in (pool, self._of_changing_signals()):
+            open_to = list(filter(self.looked.may_find("parts"), some))
+            own, there = part_candidates(open_to, tester, self.significant, refined, least)
+            found += own
+            joints |= there
         return [own for own in found if all(self.can_be(c, self.chosen) for c in own)], joints
+
+    def _of_changing_signals(self) -> list[Candidate]:
+        """Free functions of the signals of which one differs between the recordings."""
+        effect = get_effect("function_of_signal")
+        assert isinstance(effect, FunctionOfSignals)
+        found = []
+        for c in self.pool:
+            if isinstance(c.term.effect, SizeByRecording):
+                shape = effect.shape_of(self.problem.few, (c.term.shape["of"],))
+                term = Term.at(effect.kind, c.joints, shape)
+                rows = self.problem.term_rows(term)
+                names = effect.variables(c.joints[0], shape)
+                found.append(Candidate(UNKNOWN, term, rows, names, n_chosen=c.n_chosen))
+        return found
 
     def _spans(self) -> list[list[Candidate]]:
         """Effects that begin or end within recordings, those that may be possible."""
