@@ -76,7 +76,8 @@ class RankingSearch(LineSearch):
         ranking += [self.against_functions(h, ranking) for h in lines]
         ranking += self._finals([own for of_kind in found[len(screening) :] for own in of_kind])
         ranking += self._finals(parts, refined=0)  # their shapes are refined already
-        ranking += self._finals([*spans, *courses, *sizes], refined=0)
+        in_time = self._finals([*spans, *courses, *sizes], refined=0)
+        ranking += [h for h in in_time if not self._follows_one_joint(h.candidates, h.gain)]
         ranking += self._other_forms(ranking)
         self.looked.keep("lines", chain.from_iterable(h.joints for h in lines))
         self.looked.keep("parts", in_parts)
@@ -425,9 +426,9 @@ class RankingSearch(LineSearch):
         among = self.looked.may_find("spans")
         found = span_candidates(self.problem, kinds, tester, self.significant, least, among)
         found = [own for own in found if all(self.can_be(c, self.chosen) for c in own)]
-        return [self._in_time(own) for own in found if not self._follows_one_joint(tester, own)]
+        return [self._in_time(own) for own in found]
 
-    def _follows_one_joint(self, tester: Tester, own: Sequence[Candidate]) -> bool:
+    def _follows_one_joint(self, own: Sequence[Candidate], gain: Array) -> bool:
         """Whether a load in intervals of many recordings, or one, explains a single joint only.
 
         A force whose torque on several joints has the right ratios is a force; one that explains a
@@ -435,12 +436,9 @@ class RankingSearch(LineSearch):
         """
         timed = {name for c in own for name, *_ in c.term.spans}
         several = any(len(c.rows) > 1 for c in own)
-        if not several or 1 < len(timed) <= self.settings.most_recordings:
+        if not timed or not several or 1 < len(timed) <= self.settings.most_recordings:
             return False
-        left = tester.beside([c.rows for c in own]).residual
-        pairs = zip(tester.residual, left, strict=True)
-        removed = np.array([float(before @ before - after @ after) for before, after in pairs])
-        return bool(removed.max() > ALL_LEFT * np.maximum(removed, 0.0).sum())
+        return bool(gain.max() > ALL_LEFT * np.maximum(gain, 0.0).sum())
 
     def _in_time(self, own: list[Candidate]) -> list[Candidate]:
         """An offset or friction in intervals of many recordings as an unknown function of time.

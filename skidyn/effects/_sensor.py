@@ -20,7 +20,9 @@ class TorqueGain(Effect):
     With a ``sign`` in its shape this holds only for positive (1) or negative torque (-1), as for a
     fault in one half of a bridge or of an amplifier. With ``over_speed`` the factor changes with
     the speed of the joint, as where the voltage for the current is no longer sufficient; with
-    ``over_torque`` it changes with the torque, as that of a motor whose iron saturates.
+    ``over_torque`` it changes with the torque, as that of a motor whose iron saturates. With
+    ``near_zero``, in N m, small torques have another factor, as from a converter or amplifier that
+    is not linear where the current changes its sign: it fades exponentially over this torque.
     """
 
     kind = "torque_gain"
@@ -31,7 +33,18 @@ class TorqueGain(Effect):
     #: Change of the factor per speed, and per torque.
     per_speed = Coefficient("epsilon_speed", "s/rad")
     per_torque = Coefficient("epsilon_torque", "1/(N m)")
-    forms = ({"sign": 1.0}, {"sign": -1.0}, {"over_speed": 1.0}, {"over_torque": 1.0})
+    #: What is added to the factor at the smallest torques.
+    at_zero = Coefficient("epsilon_zero", "1")
+    #: The plain form needs none.
+    has_shape = False
+    shapes = (Shape("near_zero", "N m", (), 1e-9, np.inf, scales=False, has_interval=False),)
+    forms = (
+        {"sign": 1.0},
+        {"sign": -1.0},
+        {"over_speed": 1.0},
+        {"over_torque": 1.0},
+        {"near_zero": 0.2},  # of the largest torque
+    )
     needs = ("model_torque",)
     by_recording = True
     drifts = True
@@ -40,9 +53,18 @@ class TorqueGain(Effect):
     separating_motion = "a known payload carried through the same motion"
     reference = "Gautier, Briot (2014), ASME JDSMC 136(5): drive gains from a known payload."
 
+    def grid(self, signals: Signals, joints: Sequence[int]) -> list[dict[str, Any]]:
+        *others, near_zero = map(dict, self.forms)
+        torque = signals.model_torque
+        most = 0.0 if torque is None else float(np.quantile(np.abs(torque[:, joints[0]]), 0.999))
+        small = {name: share * most for name, share in near_zero.items()}
+        return [{}, *others, *([small] if most > 0 else [])]
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         assert signals.model_torque is not None
         torque = signals.model_torque[:, [joint]]
+        if "near_zero" in shape:
+            return np.hstack([torque, torque * np.exp(-np.abs(torque) / shape["near_zero"])])
         if "over_speed" in shape:
             return np.hstack([torque, torque * np.abs(signals.dq[:, [joint]])])
         if "over_torque" in shape:
@@ -51,13 +73,18 @@ class TorqueGain(Effect):
         return torque if sign is None else sign * np.maximum(0.0, sign * torque)
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
-        changes = {"over_speed": (self.per_speed,), "over_torque": (self.per_torque,)}
+        changes = {
+            "over_speed": (self.per_speed,),
+            "over_torque": (self.per_torque,),
+            "near_zero": (self.at_zero,),
+        }
         further = next((own for form, own in changes.items() if form in shape), ())
         return (*self.coefficients, *further)
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
         speed, torque = ("s/m", "1/N") if prismatic else ("s/rad", "1/(N m)")
-        return super().units(prismatic) | {"epsilon_speed": speed, "epsilon_torque": torque}
+        further = {"epsilon_speed": speed, "epsilon_torque": torque, "epsilon_zero": "1"}
+        return super().units(prismatic) | further
 
 
 #: Share of a sampling step within which the values of a row may have been taken.
@@ -148,6 +175,9 @@ def _earlier(x: Array, signals: Signals, shift: float) -> Array:
 #: Least share of the torque beyond the limit that a saturation removes; less is a gain that changes
 #: with the torque.
 LEAST_CUT = 0.3
+#: Largest share of it that a limit cuts off, with the error of its estimate: of what is beyond, no
+#: more than all is missing.
+MOST_CUT = 1.25
 #: Quantiles of the torque that are tried as its limit: rare peaks are far above it.
 CUT_OFF = (0.98, 0.92)
 
@@ -165,7 +195,7 @@ class Saturation(Effect):
     drawn_against = "load"
     title = "Torque saturation"
     formula = r"-c\,\mathrm{sign}(\tau)\max(0,\,|\tau| - L)"
-    coefficients = (Coefficient("share", "1", sign=1, is_share=True),)
+    coefficients = (Coefficient("share", "1", sign=1, limit=MOST_CUT, is_share=True),)
     shapes = (
         Shape("limit", "N m", (0.97, 0.93, 0.88, 0.8, 0.7, 0.6), 1e-9, np.inf, scales=False),
         Shape("limit_below", "N m", (), 1e-9, np.inf, scales=False),
