@@ -292,7 +292,8 @@ def part_candidates(
         parts = [(part, c) for c in own if (part := part_of[c]) is not None]
         if not parts:
             continue
-        part, candidate = max(parts, key=lambda item: item[0].drop)
+        # twice the number of coefficients is what they remove from noise, and lose where held out
+        part, candidate = max(parts, key=lambda item: item[0].drop - 2.0 * item[1].width)
         if part.drop <= least:
             continue
         inside = within(problem, candidate, part.recordings)

@@ -34,6 +34,10 @@ from skidyn.diagnosis._split import recordings_with
 from skidyn.effects import Term, get_effect
 
 
+#: Share of the recordings with an effect above which it is one of all, of different sizes.
+MOSTLY = 0.5
+
+
 class ReconsideringSearch(DuellingSearch):
     """A search that judges findings together."""
 
@@ -117,21 +121,23 @@ class ReconsideringSearch(DuellingSearch):
         return max(judged, key=lambda h: h.score, default=None)
 
     def _plain_first(self, best: Hypothesis) -> tuple[Hypothesis, Sequence[Candidate]]:
-        """Friction that the model lacks and that changes, instead of a size for each recording.
+        """Friction that the model lacks and that changes, instead of sizes for most recordings.
 
         With the terms of the change, beside which the plain friction has to be significant: with
         one size in all recordings, it leaves more than it removes in some of them.
         """
         names, own = self.problem.rows.recordings, grouped_by_joints(best.candidates)
         if best.kind not in FRICTION or not all(
-            len(some) > 1 and recordings_with(best.kind, some, names).all() for some in own
+            len(some) > 1 and recordings_with(best.kind, some, names).mean() > MOSTLY for some in own
         ):
             return best, ()
         joints = {some[0].joints for some in own}
         plain = [c for c in self.pool if c.kind == best.kind and c.joints in joints]
         first = self._final(plain, refined=False) if plain else None
-        second = None if first is None else self._second_beside(first, first.joints)
-        return (best, ()) if first is None or second is None else (first, second.candidates)
+        if first is None or self._reconsidering:
+            return first or best, ()  # the change is a finding already
+        second = self._second_beside(first, first.joints)
+        return (best, ()) if second is None else (first, second.candidates)
 
     def _offset_later(self, step: Hypothesis) -> Hypothesis:
         """A step in time between two recordings, as an offset of the later ones."""

@@ -143,6 +143,14 @@ class FunctionOfSignal(FunctionOfSignals):
     n_signals = 1
 
 
+class LowOrderOfSignal(FunctionOfSignal):
+    """A function of one signal of any joint in low orders, which few recordings determine."""
+
+    kind = "low_order_of_signal"
+    title = "Function of one signal in low orders"
+    coefficients = unnamed_coefficients(4)
+
+
 class FunctionOfTwoSignals(FunctionOfSignals):
     """A function of two signals of any joints."""
 
@@ -321,6 +329,7 @@ class TorqueBetweenTwoJoints(NamelessEffect):
 OF_SIGNALS: tuple[type[NamelessEffect], ...] = (
     FunctionOfSignal,
     FunctionOfTwoSignals,
+    LowOrderOfSignal,
     LowOrderOfTwoSignals,
     FunctionOfThreeSignals,
     FrictionOverTwoSignals,

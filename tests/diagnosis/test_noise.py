@@ -45,3 +45,18 @@ def test_noise_that_passed_a_low_pass_filter_is_noise(complete_log, cutoff):
 
     assert found.verdict == "complete"
     assert np.all(np.abs(np.log(found.sensor_noise / passed)) < np.log(4.0))
+
+
+def test_a_loud_recording_has_no_intermittent_torque():
+    """Its noise, and not that of all, is what a torque that comes and goes has to exceed."""
+    log = make_hidden_effect_log(
+        load_planar_arm(), None, n_trajectories=6, duration=6.0, random_state=3
+    )
+    loud = (log.X["trajectory"] == log.X["trajectory"].iloc[-1]).to_numpy()
+    torque = np.array(log.y)
+    noise = np.random.default_rng(0).normal(size=int(loud.sum()))
+    torque[loud, 1] += 0.15 * np.std(log.y[:, 1]) * noise
+
+    found = diagnose(RBDRegressor(log.robot, ("viscous", "coulomb")), log.X, torque, checks=())
+
+    assert found.verdict == "complete"

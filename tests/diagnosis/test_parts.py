@@ -112,3 +112,20 @@ def test_an_offset_of_several_joints_is_one_of_the_few_recordings():
         ("offset", (1,), (2, 3)),
         ("offset", (2,), (2, 3)),
     }
+
+
+def test_a_function_of_another_joint_in_some_recordings_has_its_signal_and_these():
+    """It need not be zero in the middle of the signal, as one whose size changes."""
+    log = make_hidden_effect_log(
+        load_planar_arm(), None, n_trajectories=6, duration=6.0, random_state=8
+    )
+    some = log.X["trajectory"].isin(sorted(log.X["trajectory"].unique())[1:5:3]).to_numpy()
+    q, torque = log.X["q2"].to_numpy(), np.array(log.y)
+    hose = q / np.ptp(q) + 0.3
+    torque[:, 0] += 0.5 * np.std(log.y[:, 0]) * np.where(some, hose, 0.0)
+
+    found = diagnose(RBDRegressor(log.robot, ("viscous", "coulomb")), log.X, torque, checks=())
+
+    (finding,) = found.findings
+    assert (finding.kind, finding.joints, finding.variables) == ("unknown", (1,), ("q2",))
+    assert finding.trajectories == tuple(sorted(log.X["trajectory"][some].unique()))

@@ -149,3 +149,32 @@ def test_two_effects_that_hide_each_other_are_both_named(seed, recordings):
         ("nonlinear_spring", (2,)),
         ("temperature_friction", (2,)),
     }
+
+
+@pytest.mark.slow
+def test_friction_that_the_model_lacks_and_that_drifts_is_no_size_for_each_recording():
+    log = make_hidden_effect_log(
+        ROBOT, "friction_drift", joints=[1, 2], n_trajectories=8, duration=6.0, random_state=15
+    )
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = diagnose(RBDRegressor(ROBOT, ()), log.X, log.y)
+
+    everywhere = {(f.kind, f.joints) for f in found.findings if f.trajectories is None}
+    assert everywhere >= {(k, (j,)) for k in ("viscous", "friction_drift") for j in (1, 2)}
+    assert not [f for f in found.findings if f.kind == "viscous" and f.trajectories is not None]
+
+
+@pytest.mark.slow
+def test_the_second_of_two_kinds_of_friction_is_named_where_the_first_was_fitted_to_both():
+    log = make_hidden_effect_log(ROBOT, None, noise="low", random_state=21)
+    dq = log.X["dq1"].to_numpy()
+    backwards = -np.sqrt(np.maximum(-dq, 0.0))
+    stribeck = np.exp(-np.sqrt(np.abs(dq) / (0.05 * np.abs(dq).max()))) * np.sign(dq)
+    torque, size = np.array(log.y), 0.3 * np.std(log.y[:, 0])
+    torque[:, 0] += size * (backwards / np.std(backwards) + stribeck / np.std(stribeck))
+
+    found = diagnosed(log.X, torque)
+
+    assert {f.kind for f in found.findings} == {"asymmetric_friction", "stribeck"}

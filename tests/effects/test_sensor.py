@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.effects import get_effect
+from skidyn.effects import Term, get_effect
 
 
 def test_delay_is_a_shift(signals):
@@ -84,3 +84,22 @@ def test_a_gain_may_change_with_the_torque(signals):
     np.testing.assert_allclose(found, (0.1 - 0.02 * np.abs(torque)) * torque)
     names = [c.name for c in effect.coefficients_of({"over_torque": 1.0})]
     assert [effect.units()[name] for name in names] == ["1", "1/(N m)"]
+
+
+def test_a_gain_may_differ_at_small_torques(signals):
+    effect = get_effect("torque_gain")
+    (shape,) = (s for s in effect.grid(signals, [1]) if "near_zero" in s)
+
+    found = effect.columns(signals, 1, **shape) @ [0.1, -0.2]
+
+    torque = signals.model_torque[:, 1]
+    factor = 0.1 - 0.2 * np.exp(-np.abs(torque) / shape["near_zero"])
+    np.testing.assert_allclose(found, factor * torque)
+    names = [c.name for c in effect.coefficients_of(shape)]
+    assert names == ["epsilon", "epsilon_zero"]
+    assert not effect.has_shape
+
+
+def test_a_limit_does_not_cut_off_more_than_is_beyond():
+    term = Term.at("saturation", (0,), {"limit": 2.0})
+    assert 1.0 < term.limits[0] < 1.4

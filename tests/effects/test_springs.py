@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from skidyn.datasets import load_scara
 from skidyn.effects import Signals, Term, get_effect
 
 
@@ -153,3 +154,20 @@ def test_a_shock_absorber_resists_the_approach_only(signals, columns_of):
     effect = get_effect("end_stop")
     assert [c.name for c in effect.coefficients_of({"one_way": 1.0})] == ["k", "d"]
     assert effect.units(prismatic=True)["d"] == "N s/m^2"
+
+
+def test_what_stops_a_vertical_slide_on_its_way_down_is_usually_a_contact():
+    robot, stop = load_scara(), get_effect("end_stop")
+    slides = np.array([kind == "prismatic" for kind in robot.joint_types])
+    q = np.random.default_rng(0).uniform(-0.3, 0.3, (20, robot.n_joints))
+    signals = Signals(q, q, q, np.zeros(20, dtype=int), prismatic=slides, robot=robot)
+    slide = int(np.argmax(slides))
+    down = float(-np.sign(robot.jacobian(signals.q)[0, 2, slide]))
+
+    def usually(joint, **shape):
+        return stop.usually(np.ones(1), shape, signals, [joint])
+
+    assert usually(slide, q_lim=0.0, side=down) == "environment_contact"
+    assert usually(slide, q_lim=0.0, side=-down) is None
+    assert usually(slide, q_lim=0.1, q_low=-0.1, side=down) is None
+    assert usually(0, q_lim=0.0, side=down) is None
