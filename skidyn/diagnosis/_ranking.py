@@ -472,7 +472,14 @@ class RankingSearch(LineSearch):
         return [h for h in found if h is not None and h.score > self.settings.least_gain]
 
     def _final(self, candidates: list[Candidate], refined: bool) -> Hypothesis | None:
-        """An explanation with its score; None if it is physically impossible."""
+        """An explanation with its score; None if it is impossible, physically or numerically."""
+        try:
+            return self._scored(candidates, refined)
+        except np.linalg.LinAlgError:
+            return None  # a refined shape without bound, whose columns are those of the model
+
+    def _scored(self, candidates: list[Candidate], refined: bool) -> Hypothesis | None:
+        """The same, unless the model with it has no solution."""
         kind = candidates[0].kind
         candidates = [replace(c, rows=self.problem.term_rows(c.term)) for c in candidates]
         within = any(map(self.is_judged_within, candidates))
