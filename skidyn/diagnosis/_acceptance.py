@@ -86,7 +86,7 @@ class JudgingSearch(ChoosingSearch):
         What depends on the motion of another joint, but has no reaction on it, is not a coupling:
         most of the reaction would have to be taken back, or nothing of it is seen.
         """
-        if candidate.kind == UNKNOWN or candidate.term.effect.scope != "pair":
+        if candidate.term.effect.scope != "pair":
             return True
         tester = self.tester([*self.chosen, *(c for c in together if c is not candidate)])
         size, _ = tester.estimate(candidate.rows)
@@ -97,6 +97,8 @@ class JudgingSearch(ChoosingSearch):
             if tester.beside(rest).test(own).chance > self.settings.member:
                 return False
             torque, change = columns @ size, columns @ beside.estimate(own)[0]
+            if torque @ torque < candidate.width * self.sigma[joint] ** 2:
+                return False  # too little to be seen, such as where a free ratio has no bound
             taken_back = torque @ change < -TAKEN_BACK * (torque @ torque)
             if taken_back and self.significant(beside.test(own).chance, candidate):
                 return False

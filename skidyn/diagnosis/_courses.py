@@ -69,6 +69,8 @@ def course_candidates(
     loads = [whole.term.effect.search == "trajectories" for whole in wholes]
     # a load that some recordings carry; which they are may show for another kind of load only
     carried = {p.recordings for p, load in zip(parts, loads, strict=True) if load and p is not None}
+    # where the bodies have taken the load, the recordings without it differ
+    carried |= {tuple(name for name in names if name not in some) for some in carried}
     for whole, part, is_load in zip(wholes, parts, loads, strict=True):
         constant = tester.estimate(whole.rows)[1]
         tried = [(over, names)] * (len(names) > 1) + [(within, names)]

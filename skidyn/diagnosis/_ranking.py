@@ -39,7 +39,7 @@ from skidyn.diagnosis._screen import Model, Screen
 from skidyn.diagnosis._spans import FOLLOWS_ANY, span_candidates
 from skidyn.diagnosis._split import prepare_splits, recordings_with, split_effects
 from skidyn.diagnosis._tester import Tester
-from skidyn.effects import FunctionOfSignals, SizeByRecording, Term, get_effect, nameless_kinds
+from skidyn.effects import FunctionOfSignals, FunctionOfSum, SizeByRecording, Term, get_effect, nameless_kinds
 
 Mask = NDArray[np.bool_]
 #: Indices in the pool of the added candidates, and the reduction of the held-out error.
@@ -79,6 +79,7 @@ class RankingSearch(LineSearch):
         in_time = self._finals([*spans, *courses, *sizes], refined=0)
         ranking += [h for h in in_time if not self._follows_one_joint(h.candidates, h.gain)]
         ranking += self._other_forms(ranking)
+        ranking += self._finals(self._on_one_joint(ranking), refined=0)
         self.looked.keep("lines", chain.from_iterable(h.joints for h in lines))
         self.looked.keep("parts", in_parts)
         of_recordings = chain.from_iterable(found[len(screening) :])
@@ -98,6 +99,23 @@ class RankingSearch(LineSearch):
             others = [h for h in ranking if h is not own and set(own.joints) & set(h.joints)]
             return any(h.score > least for h in others)
         return says_little(own) or self._holds_in_all(own, ranking)
+
+    def _on_one_joint(self, ranking: Sequence[Hypothesis]) -> list[list[Candidate]]:
+        """Torques between two joints of which one feels nothing, as torques on the other one."""
+        effect, found = get_effect("function_of_sum"), []
+        assert isinstance(effect, FunctionOfSum)
+        for h in ranking:
+            gain = np.maximum(h.gain, 0.0)
+            joint = int(np.argmax(gain))
+            for c in h.candidates if gain[joint] > ALL_LEFT * gain.sum() else ():
+                of_sum = c.kind == UNKNOWN and len(c.joints) == 2 and "ratio" in c.term.shape
+                if of_sum and joint in c.joints:
+                    weights = 1.0, float(c.term.shape["ratio"])
+                    shape = effect.shape_of(self.problem.few, c.joints, weights)
+                    term = Term.at(effect.kind, (joint,), shape)
+                    rows = self.problem.term_rows(term)
+                    found.append([Candidate(UNKNOWN, term, rows, c.variables)])
+        return found
 
     def _other_forms(self, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Other forms of the best kinds, if their residual is not noise.

@@ -19,12 +19,24 @@ MOVES, DRIVEN = 0.05, 0.05
 
 def _carried(signals: Signals, joint: int, shape: Mapping[str, Any]) -> Array:
     """Torque that the gear transmits, with the drive's own friction, damping and inertia."""
+    if "gravity" in shape:
+        return _held(signals)[:, joint]
     assert signals.load is not None
     dry = shape.get("friction", 0.0) * signals.sign[:, joint]
     viscous = shape.get("damping", 0.0) * signals.dq[:, joint]
     rotor = shape.get("inertia", 0.0) * signals.ddq[:, joint]
     carried: Array = signals.load[:, joint] + dry + viscous + rotor
     return carried
+
+
+def _held(signals: Signals) -> Array:
+    """Torque that holds the described bodies at rest, (n_samples, n_joints), N m or N."""
+    robot, rest = signals.robot, np.zeros_like(signals.q)
+    assert robot is not None
+    held: Array = signals.once(
+        "torque at rest", lambda: robot.inverse_dynamics(signals.q, rest, rest)
+    )
+    return held
 
 
 class LoadDependentFriction(Effect):
@@ -39,7 +51,8 @@ class LoadDependentFriction(Effect):
     counts, the load includes the ``friction`` (N m or N) and the ``damping`` that the drive has to
     overcome as well, and the ``inertia`` of the rotor (kg m^2 or kg) that it accelerates. The
     friction of a preloaded gear depends on the load above a ``threshold``, N m or N; that of a
-    single rubbing flank depends on load of one sign (``side``, 1 or -1).
+    single rubbing flank depends on load of one sign (``side``, 1 or -1). With ``gravity``, only the
+    weight of the described bodies counts, as for bearings that carry them.
 
     The gear transmits the torque that the bodies need at the joint; the torque that accelerates the
     rotor acts before the gear and is part of the load only with an ``inertia``. A fit that hardly
@@ -73,6 +86,7 @@ class LoadDependentFriction(Effect):
         {"threshold": 0.5},
         {"side": 1.0},
         {"side": -1.0},
+        {"gravity": 1.0},
     )
     needs = ("load",)
     simplicity = 7
