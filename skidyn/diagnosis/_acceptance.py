@@ -32,8 +32,10 @@ from skidyn.diagnosis._rule import (
     NEARLY,
     ON_ONE_OF_TWO,
     TAKEN_BACK,
+    TWIN,
 )
 from skidyn.diagnosis._tester import Tester
+from skidyn.effects import get_effect
 
 
 class JudgingSearch(ChoosingSearch):
@@ -393,16 +395,25 @@ class JudgingSearch(ChoosingSearch):
         )
 
     def _alike(self, best: Hypothesis, rivals: Sequence[Hypothesis]) -> bool:
-        """Whether a known effect on other joints explains equally much.
+        """Whether a known effect on other joints, or with an equal torque, explains equally much.
 
-        It says nothing against friction that every joint has.
+        It says nothing against friction that every joint has. Where the bodies differ, the torque
+        may be the same: that of a rotor on a vertical slide is an offset with a heavier slide.
         """
-        return not is_plain_friction(best) and any(
-            h.kind != UNKNOWN
-            and h.joints != best.joints
-            and h.score >= (1 - self.settings.alike) * best.score
-            for h in rivals
+        if is_plain_friction(best):
+            return False
+        known = [h for h in rivals if h.kind != UNKNOWN]
+        least = (1 - self.settings.alike) * best.score
+        return any(
+            h.score >= least if h.joints != best.joints else self._is_twin(h, best) for h in known
         )
+
+    @staticmethod
+    def _is_twin(rival: Hypothesis, best: Hypothesis) -> bool:
+        """Whether two explanations are as simple, as exact, and hardly differ in what they remove."""
+        exact = all(get_effect(h.kind).is_exact for h in (rival, best))
+        differ = abs(float((rival.gain - best.gain).sum()))
+        return exact and rival.n_parameters == best.n_parameters and differ < TWIN
 
     def on_neighbours(self, best: Hypothesis) -> Hypothesis:
         """An effect with the other joints on which it explains equally much.

@@ -99,6 +99,9 @@ BEYOND_FORMULAS = 0.5
 #: Of explanations that the data cannot separate, one is preferred with which the torque of the
 #: identified bodies differs from that of the described ones by less than this share of the others.
 NEARER = 0.5
+#: Twice the difference in log-likelihood below which two exact formulas with equally many numbers
+#: have the same torque beside the bodies: e to this half is hardly any evidence.
+TWIN = 1.0
 #: Viscous or Coulomb friction that the model lacks is added before another effect on its joints if
 #: it removes more than this share of the squared error that that removes (``_choice.py``).
 FRICTION_SHARE = 0.5
