@@ -163,9 +163,9 @@ def _listed(
     unlisted = slight(problem, result.findings, intervals, judged.history[-1]["rmse"])
     findings = []
     for i, hypothesis in enumerate(result.findings):
-        if i in unlisted:
-            continue
         for candidate, chance in zip(hypothesis.candidates, hypothesis.chances, strict=True):
+            if candidate.term in unlisted:
+                continue
             reached = tuple(candidate.rows)
             drop = drop_of(shown[i], shown[i + 1], reached)
             averaged = drop_of(judged.averages[i], judged.averages[i + 1], reached)
@@ -181,7 +181,7 @@ def _listed(
             )
             finding.curves.extend(curves)
             findings.append(finding)
-    return findings, list(unlisted.values())
+    return findings, list(dict.fromkeys(unlisted.values()))
 
 
 def _in_time(

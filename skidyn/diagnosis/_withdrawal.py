@@ -40,6 +40,7 @@ from skidyn.diagnosis._rule import (
     MUCH,
     NOISE_REMOVED,
     SURE_OF_LITTLE,
+    UNDETERMINED,
     UNLIKELY,
     false_discovery_rate,
 )
@@ -230,8 +231,8 @@ def slight(
     findings: Sequence[Hypothesis],
     intervals: dict[Term, dict[str, Any]],
     errors: Sequence[float],
-) -> dict[int, str]:
-    """Indices of findings that are too small to be significant for the robot, with remarks.
+) -> dict[Term, str]:
+    """Terms of findings that are too small to be significant for the robot, with remarks.
 
     They remain in the model with which later effects were found and errors are stated, and are not
     part of :attr:`Diagnosis.model`.
@@ -249,26 +250,43 @@ def slight(
     """
     remarks = {}
     signals = problem.signals if problem.logged is None else problem.logged
-    for i, hypothesis in enumerate(findings):
-        reasons = []
+    for hypothesis in findings:
+        reasons: dict[Term, str] = {}
         for candidate in hypothesis.candidates:
             told = intervals[candidate.term]
             found = {name: v for name, v in told.items() if isinstance(v, tuple)}
-            reasons.append(candidate.term.effect.too_small(found, signals))
-        where = joints_told(j + 1 for j in hypothesis.joints)
+            reason = candidate.term.effect.too_small(found, signals) or _undetermined(found)
+            if reason is not None:
+                reasons[candidate.term] = reason
+        small = [c.term for c in hypothesis.candidates if c.term in reasons]
         if is_vibration(hypothesis) and _in_the_noise(hypothesis, errors):
+            small = [c.term for c in hypothesis.candidates]
             lines = {f"{c.term.shape['frequency']:.3g}" for c in hypothesis.candidates}
             waves = listed(sorted(lines, key=float))
             remark = (
-                f"The torque of {where} contains a wave of {waves} Hz that is smaller than the "
-                "noise, such as hum in a sensor"
+                f"The torque of {joints_told(j + 1 for j in hypothesis.joints)} contains a wave of "
+                f"{waves} Hz that is smaller than the noise, such as hum in a sensor"
             )
-        elif reasons and all(reasons):
-            remark = f"{get_effect(hypothesis.kind).title} on {where}: {reasons[0]}"
-        else:
-            continue
-        remarks[i] = f"{remark}. {UNLISTED}"
+        elif small:
+            where = joints_told(sorted({j for term in small for j in term.joints}))
+            remark = f"{get_effect(hypothesis.kind).title} on {where}: {reasons[small[0]]}"
+        remarks |= dict.fromkeys(small, f"{remark}. {UNLISTED}") if small else {}
     return remarks
+
+
+def _undetermined(intervals: dict[str, tuple[float, float, float]]) -> str | None:
+    """Reason why an effect with a single number is none, in words: the number may be any.
+
+    Shapes of other effects, which do not count when an effect is found, may take its place.
+    """
+    ((_, *ends),) = intervals.values() if len(intervals) == 1 else [(0.0, 1.0, 1.0)]
+    least, most = sorted(map(abs, ends))
+    if most <= UNDETERMINED * least or ends[0] * ends[1] <= 0:
+        return None
+    return (
+        f"its size is not determined beside the other effects, with an interval from {ends[0]:.2g} "
+        f"to {ends[1]:.2g}"
+    )
 
 
 def _in_the_noise(hypothesis: Hypothesis, errors: Sequence[float]) -> bool:

@@ -403,7 +403,9 @@ class Backlash(_LinkSideEffect):
     def too_small(
         self, intervals: Mapping[str, tuple[float, float, float]], signals: Signals
     ) -> str | None:
-        gap = intervals["gap"][0]
+        gap, low, _ = intervals["gap"]
+        if low <= 0:
+            return "the interval of the play contains zero"
         steps = [step for step in map(position_step, signals.q.T) if step > gap]
         if len(steps) < signals.n_joints:  # a finer sensor, or one without visible steps
             return None
