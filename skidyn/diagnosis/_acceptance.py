@@ -411,7 +411,7 @@ class JudgingSearch(ChoosingSearch):
     @staticmethod
     def _is_twin(rival: Hypothesis, best: Hypothesis) -> bool:
         """Whether two explanations are as simple, as exact, and hardly differ in what they remove."""
-        exact = all(get_effect(h.kind).is_exact for h in (rival, best))
+        exact = best.kind != UNKNOWN and all(get_effect(h.kind).is_exact for h in (rival, best))
         differ = abs(float((rival.gain - best.gain).sum()))
         return exact and rival.n_parameters == best.n_parameters and differ < TWIN
 
@@ -451,8 +451,14 @@ class JudgingSearch(ChoosingSearch):
         if not (pairs or (gains and self.problem.rigid_body)):
             return []
         taken = {c.joints for c in best.candidates}
+
+        def form_of(c: Candidate) -> set[str]:
+            return set(c.term.effect.form_names) & set(c.term.shape)
+
+        forms = [form_of(c) for c in best.candidates]
         others = self.strongest(
-            lambda c: c.joints, lambda c: c.kind == best.kind and c.joints not in taken
+            lambda c: c.joints,
+            lambda c: c.kind == best.kind and c.joints not in taken and form_of(c) in forms,
         )
         found: list[Hypothesis] = []
         for own in pairs or gains:

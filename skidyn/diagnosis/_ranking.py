@@ -39,7 +39,7 @@ from skidyn.diagnosis._screen import Model, Screen
 from skidyn.diagnosis._spans import FOLLOWS_ANY, span_candidates
 from skidyn.diagnosis._split import prepare_splits, recordings_with, split_effects
 from skidyn.diagnosis._tester import Tester
-from skidyn.effects import FunctionOfSignals, FunctionOfSum, SizeByRecording, Term, get_effect, nameless_kinds
+from skidyn.effects import FunctionOfSignals, FunctionOfSum, SizeByRecording, Term, get_effect
 
 Mask = NDArray[np.bool_]
 #: Indices in the pool of the added candidates, and the reduction of the held-out error.
@@ -424,12 +424,11 @@ class RankingSearch(LineSearch):
     def _of_changing_signals(self) -> list[Candidate]:
         """Free functions of the signals of which one differs between the recordings."""
         few, found = self.problem.few, []
-        effects = [e for e in map(get_effect, nameless_kinds()) if isinstance(e, FunctionOfSignals)]
         for c in self.pool:
             if isinstance(c.term.effect, SizeByRecording):
-                names = (c.term.shape["of"],)
-                for effect in (e for e in effects if e.admits(names)):
-                    shape = effect.shape_of(few, names)
+                for effect in map(get_effect, ("function_of_signal", "low_order_of_signal")):
+                    assert isinstance(effect, FunctionOfSignals)
+                    shape = effect.shape_of(few, (c.term.shape["of"],))
                     term = Term.at(effect.kind, c.joints, shape)
                     rows, variables = self.problem.term_rows(term), effect.variables(0, shape)
                     found.append(Candidate(UNKNOWN, term, rows, variables, n_chosen=c.n_chosen))

@@ -144,8 +144,12 @@ class FunctionOfSignal(FunctionOfSignals):
 
 
 class LowOrderOfSignal(FunctionOfSignal):
-    """A function of one signal of any joint in low orders, which few recordings determine."""
+    """A function of one signal of any joint in low orders, which few recordings determine.
 
+    It is tried for some recordings only: in all of them, the function of higher orders is better.
+    """
+
+    search = "given"
     kind = "low_order_of_signal"
     title = "Function of one signal in low orders"
     coefficients = unnamed_coefficients(4)
