@@ -107,3 +107,14 @@ def test_the_diagnosis_states_how_it_changes(motion):
     assert finding.kind == "payload"
     assert "falls steadily over each recording, from the stated size to" in finding.sentence
     assert finding.parameters["mass"]["value"] == pytest.approx(1.0, rel=0.1)
+
+
+def test_a_load_that_most_recordings_carry_grows_in_these_and_not_in_the_others(motion):
+    """The identified bodies have taken the mean of it, so that the others differ more."""
+    carrying = (0, 1, 3, 5, 7)
+    carried = np.isin(motion.trajectory, carrying) * (0.2 + 0.8 * passed(motion))
+
+    best = found_with(motion, of_load(motion) * carried[:, None])[0]
+
+    assert (best.kind, best.trajectories) == ("payload", carrying)
+    assert best.course[0][2] == pytest.approx(0.2, abs=0.06)

@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from skidyn.datasets import load_planar_arm
 from skidyn.effects import get_effect
 
 
@@ -69,3 +70,14 @@ def test_a_rotor_that_accelerates_loads_the_gear_with_its_inertia(signals):
     np.testing.assert_allclose(columns[:, 0], np.abs(load) * signals.sign[:, 0])
     assert any(set(shape) == {"inertia"} for shape in effect.grid(signals, (0,)))
     assert (effect.units()["inertia"], effect.units(prismatic=True)["inertia"]) == ("kg m^2", "kg")
+
+
+def test_only_the_weight_of_the_described_bodies_may_count(signals, columns_of):
+    robot = load_planar_arm()
+    moved = signals.with_(robot=robot)
+    rest = np.zeros_like(moved.q)
+
+    friction = columns_of("load_dependent_friction", moved, gravity=1.0)
+
+    weight = np.abs(robot.inverse_dynamics(moved.q, rest, rest)[:, 0])
+    np.testing.assert_allclose(friction[:, 0], weight * moved.sign[:, 0])
