@@ -141,8 +141,8 @@ def read_log(
         a diagnosis of a robot with another gravity refuses the log
         (:meth:`skidyn.robots.Robot.with_gravity`).
     unwrap : bool, default=False
-        Remove jumps by a full turn from positions; recordings are moved by whole turns to be near
-        each other.
+        Remove jumps by a full turn from positions, or by the range of a counter that overflows,
+        which is measured; recordings are moved by whole turns to be near each other.
     torque_sign : {"recorded", "command"}, default="recorded"
         ``"command"``: torques that are never negative get the sign of commanded minus measured
         position.

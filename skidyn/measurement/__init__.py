@@ -38,3 +38,4 @@ from skidyn.measurement._servo_settings import (
 )
 from skidyn.measurement._suspicion import CERTAINTIES as CERTAINTIES, paragraphs as paragraphs
 from skidyn.measurement._torque_delay import measured_delay as measured_delay
+from skidyn.measurement._wraps import wrap_period as wrap_period

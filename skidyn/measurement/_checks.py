@@ -65,9 +65,10 @@ from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
 from skidyn.measurement._torque import Columns, UnsignedTorque
 from skidyn.measurement._torque_delay import TorqueDelay
 from skidyn.measurement._torque_scale import TorqueScale
-from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
+from skidyn.measurement._units import ClockUnit, PositionUnit
 from skidyn.measurement._velocity import Velocity
 from skidyn.measurement._velocity_delay import VelocityDelay
+from skidyn.measurement._wrapped import WrappedPosition
 
 UNSIGNED = UnsignedTorque()
 #: The only list of checks in skidyn.

@@ -555,30 +555,3 @@ def _round_counts(counts: float) -> float:
     digits = 10.0 ** max(0, np.floor(np.log10(counts)) - 1)
     near = (2.0 ** round(np.log2(counts)), round(counts / digits) * digits)
     return next((x for x in near if abs(x / counts - 1) < WHOLE), counts)
-
-
-class WrappedPosition(Check):
-    """Positions that jump by a turn at its border."""
-
-    name = "wrapped_position"
-    suspects = "positions that jump by a full turn"
-
-    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        signals = measurement.signals
-        for k in np.flatnonzero(~signals.prismatic):
-            q = signals.q[:, k]
-            for turn, unit in ((2 * np.pi, "rad"), (360.0, "degrees")):
-                leaps = [
-                    np.abs(np.abs(np.diff(q[rows])) - turn) < 0.05 * turn
-                    for rows in signals.segments
-                ]
-                count = int(sum(leap.sum() for leap in leaps))
-                if count and np.ptp(q) < 1.1 * turn:
-                    yield self.suspicion(
-                        f"the position of {measurement.joint(int(k))} is wrapped",
-                        f"it jumps by a full turn of {turn:.4g} {unit} {count} time(s)",
-                        "certain",
-                        [int(k)],
-                        remedy_of("unwrap", True),
-                    )
-                    break

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Units of time and positions, and positions that were wrapped."""
+"""Units of time and positions."""
 
 import numpy as np
 import pytest
@@ -18,13 +18,6 @@ def test_milliseconds(signals, torque, found, only):
         found(signals.with_(time=signals.time * 1e3), torque),
         *("clock_unit", "certain", "--units time=ms"),
     )
-
-
-def test_wrapped_position(signals, torque, found):
-    far = signals.with_(q=signals.q + [np.pi, 0])
-    wrapped = far.with_(q=(far.q + np.pi) % (2 * np.pi) - np.pi)
-    told = found(wrapped, torque)
-    assert "--unwrap" in {s.remedy.option for s in told if s.check == "wrapped_position"}
 
 
 def test_clock_at_another_rate(signals, torque, found, only):
@@ -125,24 +118,3 @@ def test_speeds_of_motors_are_not_milliseconds(recorded, told_of, only):
     only(told.values(), "clock_unit", told["clock_unit"].certainty, "--gain dq=0.001047")
     assert "a gear of 100:1" in told["clock_unit"].evidence
     assert "in rpm" in told["clock_unit"].evidence
-
-
-def test_ratios_of_gears_on_each_joint_are_not_degrees():
-    robot = load_ur5()
-    log = make_hidden_effect_log(robot, None, n_trajectories=4, duration=6.0, random_state=4)
-    ratios = (100.0, 120.0, -100.0, 80.0, 100.0, -50.0)
-    frame = log.frame.assign(
-        **{
-            f"{q}{k + 1}": x * log.frame[f"{q}{k + 1}"]
-            for q in ("q", "dq")
-            for k, x in enumerate(ratios)
-        }
-    )
-    (told,) = [s for s in check_log(frame, robot).checks if s.certainty == "certain"]
-    assert told.check == "position_unit" and told.remedy is None
-    assert "another factor on each joint" in told.suspicion
-    both = {n: np.rad2deg(log.frame[n]) for k in range(6) for n in (f"q{k + 1}", f"dq{k + 1}")}
-    (told,) = [
-        s for s in check_log(log.frame.assign(**both), robot).checks if s.certainty != "noted"
-    ]
-    assert told.remedy.option == "--units q=deg,dq=deg/s"
