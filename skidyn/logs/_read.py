@@ -147,7 +147,8 @@ def read_log(
         ``"command"``: torques that are never negative get the sign of commanded minus measured
         position.
     clock : {"recorded", "regular"}, default="recorded"
-        ``"regular"``: samples were taken at even steps, and only the stamps jitter.
+        ``"regular"``: samples were taken at even steps, and only the stamps jitter, or are rounded;
+        rows stay in their order where stamps go back by a few steps.
     drop_repeated : bool, default=False
         Leave out rows that repeat all positions of the previous row while joints move, or all
         torques if they are reported less often.

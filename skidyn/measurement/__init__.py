@@ -23,6 +23,7 @@ from skidyn.measurement._checks import names_in_doubt as names_in_doubt
 from skidyn.measurement._clock import count_same_stamps as count_same_stamps
 from skidyn.measurement._copies import copied_rows as copied_rows
 from skidyn.measurement._influence import errors_of_fits as errors_of_fits
+from skidyn.measurement._interleaved import find_interleaved as find_interleaved
 from skidyn.measurement._leaps import find_leaps as find_leaps
 from skidyn.measurement._lowpass import without_lowpass as without_lowpass
 from skidyn.measurement._measures import (
