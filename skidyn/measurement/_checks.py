@@ -40,6 +40,7 @@ from skidyn.measurement._description import DescriptionLengths, DescriptionUnits
 from skidyn.measurement._differential import MotorsOfDifferential
 from skidyn.measurement._divided import DividedRecordings
 from skidyn.measurement._elapsed import LostRows
+from skidyn.measurement._external import ExternalTorque
 from skidyn.measurement._failed_reads import FailedReads
 from skidyn.measurement._gravity_of_recordings import GravityOfRecordings
 from skidyn.measurement._held import (
@@ -106,6 +107,7 @@ CHECKS: tuple[Check, ...] = (
     Columns(),
     GravityOnly(),
     TorqueScale(),
+    ExternalTorque(),
     NoFriction(),
     UnexplainedTorque(),
     Bodies(),

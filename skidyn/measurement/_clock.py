@@ -32,9 +32,9 @@ HARM, OFF = 15.0, 0.02
 #: How many times as closely positions must follow from their neighbours with even steps for stamps
 #: without influence on the torque to be suspected.
 CLOSER = 1.1
-#: Share of long steps from which stamps may be rounded, how many times as many steps too long as too
-#: short there may be, and largest distance of rounded stamps from even ones, in steps; lost rows
-#: make the distance larger.
+#: Share of long steps from which stamps may be rounded, how many times as many steps too long as
+#: too short there may be, and largest distance of rounded stamps from even ones, in steps; lost
+#: rows make the distance larger.
 MISSING, TWICE, ROUNDED = 0.05, 2.0, 1.5
 #: Share of rows that lie on a line between their neighbours.
 ON_A_LINE = 0.3
