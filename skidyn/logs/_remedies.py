@@ -465,7 +465,7 @@ def _without_lowpass(
 
 
 def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataFrame:
-    from skidyn.measurement import idle_rows, is_held
+    from skidyn.measurement import idle_rows, is_held, lost_parts
 
     q = table[[f"q{k + 1}" for k in range(n)]].to_numpy(dtype=float)
     number = table["trajectory"].to_numpy()
@@ -480,6 +480,7 @@ def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataF
         moved = np.any(q[1:] != q[:-1], axis=1) & (number[1:] == number[:-1])
         torque = table[torques].to_numpy(dtype=float)
         again |= is_held(torque, moved)
+        again |= lost_parts(q, torque, number)
         again |= idle_rows(q, dq, torque, table["time"].to_numpy(dtype=float), number)
     notes.append(f"drop_repeated: {int(again.sum())} of {len(q)} rows left out")
     return table[~again].reset_index(drop=True)

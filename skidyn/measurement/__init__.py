@@ -30,6 +30,7 @@ from skidyn.measurement._measures import (
     channel_step as channel_step,
     idle_rows as idle_rows,
     is_held as is_held,
+    lost_parts as lost_parts,
     rest_share as rest_share,
     reversals as reversals,
 )

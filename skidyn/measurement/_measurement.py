@@ -24,6 +24,7 @@ from skidyn.measurement._measures import (
     held_share,
     idle_rows,
     longest_plateau_share,
+    lost_parts,
     missing_values,
     step_share,
 )
@@ -386,7 +387,7 @@ class Measurement:
             return None
         stuck = [*self.stuck.values(), *self.constant.values()]
         odd = [*self.odd_motion, *(run for runs in stuck for run in runs)]
-        out = self.idle | np.isin(self.signals.trajectory, odd)
+        out = self.idle | self.lost_torque | np.isin(self.signals.trajectory, odd)
         if out.all():
             return None
         if not out.any():
@@ -483,6 +484,12 @@ class Measurement:
         """Rows at the ends of recordings in which torque was not measured."""
         s = self.signals
         return idle_rows(s.q, s.dq, self.torque, s.clock, s.trajectory)
+
+    @cached_property
+    def lost_torque(self) -> NDArray[np.bool_]:
+        """Rows inside recordings in which all torques keep their last values."""
+        s = self.signals
+        return lost_parts(s.q, self.torque, s.trajectory)
 
     @cached_property
     def missing(self) -> NDArray[np.bool_]:
