@@ -7,7 +7,7 @@ import inspect
 import re
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -44,8 +44,7 @@ def count_joints(frame: pd.DataFrame, source: str = "the log") -> int:
         raise LogError(
             f"{source} has no joint positions. Recognised names are q1, q_<joint>, position_1 "
             "and similar ones; it has:"
-            f" {', '.join(map(str, frame.columns))}. Name them with "
-            "--columns 'q=first{i}' (in Python: columns={'q': ['first', 'second', ...]})."
+            f" {', '.join(map(str, frame.columns))}. Name them with {_example(frame.columns)}."
         )
     if numbers != list(range(1, len(numbers) + 1)):
         absent = sorted(set(range(1, numbers[-1] + 1)) - set(numbers))
@@ -53,6 +52,29 @@ def count_joints(frame: pd.DataFrame, source: str = "the log") -> int:
             f"{source} has q{numbers[-1]} but lacks {', '.join(f'q{k}' for k in absent)}."
         )
     return len(numbers)
+
+
+#: Words in names of columns that hold no positions.
+_OTHERS = re.compile(
+    r"vel|speed|spd|dq|acc|tau|torque|eff|curr|force|temp|volt|cmd|des|target", re.I
+)
+
+
+def _example(columns: Iterable[object]) -> str:
+    """The option that names positions, with numbered columns of the log if it has some.
+
+    >>> _example(["time", "turn_A1", "turn_A2", "torque_A1", "torque_A2"])
+    "--columns 'q=turn_A{i}' (in Python: columns={'q': 'turn_A{i}'})"
+    """
+    numbers: dict[str, set[int]] = {}
+    for name in map(str, columns):
+        if (hit := re.fullmatch(r"(.*?)(\d+)(\D*)", name)) and not _OTHERS.search(name):
+            numbers.setdefault(f"{hit[1]}{{i}}{hit[3]}", set()).add(int(hit[2]))
+    for name, own in numbers.items():
+        first = min(own)
+        if name != "{i}" and first < 2 <= len(own) and own == {first + k for k in range(len(own))}:
+            return f"--columns 'q={name}' (in Python: columns={{'q': '{name}'}})"
+    return "--columns 'q=first{i}' (in Python: columns={'q': ['first', 'second', ...]})"
 
 
 def require_columns(

@@ -37,9 +37,8 @@ MORE_ZEROS = 2.0
 FEW_VALUES = 64
 #: Fewest values of a torque that is not coarse.
 FINE = 50
-#: Fewest rows of one value that are a plateau of a torque, and share of rows in plateaus at which
-#: they are usual.
-PLATEAU, REPEATS = 5, 0.2
+#: Fewest rows of one value that are a plateau of a torque.
+PLATEAU = 5
 #: How many times as long as 95 % of the parts with the same torques a part is in which these were
 #: lost, share of the torques that change before and after it, and fewest such parts.
 LOST, MOST_CHANGE, FEWEST_LOST = 4, 0.7, 2
@@ -308,10 +307,7 @@ def longest_plateau_share(torque: np.ndarray, segments: Sequence[slice]) -> floa
     same[1:] = torque[1:] == torque[:-1]
     others = 1 + _plateaus(same & ~(high | low), segments, PLATEAU - 1)
     longest = int(others.max(initial=0))
-    if others.sum() > REPEATS * len(torque):
-        rows = sum(lengths[lengths > longest].sum() for lengths in limits)
-    else:
-        rows = sum(x.sum() for x in limits if len(x) > 1 or x.max(initial=0) > longest)
+    rows = sum(x.sum() for x in limits if len(x) > 1 or x.max(initial=0) > longest)
     return float(rows) / len(torque)
 
 
