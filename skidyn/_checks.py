@@ -7,7 +7,7 @@ import inspect
 import re
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -44,8 +44,7 @@ def count_joints(frame: pd.DataFrame, source: str = "the log") -> int:
         raise LogError(
             f"{source} has no joint positions. Recognised names are q1, q_<joint>, position_1 "
             "and similar ones; it has:"
-            f" {', '.join(map(str, frame.columns))}. Name them with "
-            "--columns 'q=first{i}' (in Python: columns={'q': ['first', 'second', ...]})."
+            f" {', '.join(map(str, frame.columns))}. Name them with {_example(frame.columns)}."
         )
     if numbers != list(range(1, len(numbers) + 1)):
         absent = sorted(set(range(1, numbers[-1] + 1)) - set(numbers))
@@ -53,6 +52,29 @@ def count_joints(frame: pd.DataFrame, source: str = "the log") -> int:
             f"{source} has q{numbers[-1]} but lacks {', '.join(f'q{k}' for k in absent)}."
         )
     return len(numbers)
+
+
+#: Words in names of columns that hold no positions.
+_OTHERS = re.compile(
+    r"vel|speed|spd|dq|acc|tau|torque|eff|curr|force|temp|volt|cmd|des|target", re.I
+)
+
+
+def _example(columns: Iterable[object]) -> str:
+    """The option that names positions, with numbered columns of the log if it has some.
+
+    >>> _example(["time", "turn_A1", "turn_A2", "torque_A1", "torque_A2"])
+    "--columns 'q=turn_A{i}' (in Python: columns={'q': 'turn_A{i}'})"
+    """
+    numbers: dict[str, set[int]] = {}
+    for name in map(str, columns):
+        if (hit := re.fullmatch(r"(.*?)(\d+)(\D*)", name)) and not _OTHERS.search(name):
+            numbers.setdefault(f"{hit[1]}{{i}}{hit[3]}", set()).add(int(hit[2]))
+    for name, own in numbers.items():
+        first = min(own)
+        if name != "{i}" and first < 2 <= len(own) and own == {first + k for k in range(len(own))}:
+            return f"--columns 'q={name}' (in Python: columns={{'q': '{name}'}})"
+    return "--columns 'q=first{i}' (in Python: columns={'q': ['first', 'second', ...]})"
 
 
 def require_columns(
@@ -175,24 +197,54 @@ def handle_missing(
     return kept
 
 
+#: Most steps of a clock by which jittering stamps go back: more is another recording.
+FEW_STEPS = 5.0
+
+
+def stamps_jitter(time: np.ndarray, trajectory: np.ndarray) -> bool:
+    """Whether time goes backwards within trajectories, and only by a few steps.
+
+    >>> stamps_jitter(np.array([0.0, 0.1, 0.22, 0.21, 0.4]), np.zeros(5, int))
+    True
+    >>> stamps_jitter(np.array([0.0, 0.1, 0.2, 0.3, 0.0, 0.1]), np.zeros(6, int))
+    False
+    """
+    same = trajectory[1:] == trajectory[:-1]
+    steps = np.diff(time)[same]
+    forward = steps[steps > 0]
+    if not len(forward) or len(forward) < len(steps) / 2 or not np.any(steps < 0):
+        return False
+    # a restart after a few rows is a new recording, unless there are many steps forward
+    least = min(FEW_STEPS, len(forward) / 2)
+    return bool(steps.min() > -least * np.median(forward))
+
+
 def check_time_order(
     time: np.ndarray, trajectory: np.ndarray, source: str = "the log"
 ) -> np.ndarray:
     """Rows to keep so that time increases strictly within each trajectory.
 
     A row with the time of the previous row is left out; a LogError is raised if time goes
-    backwards.
+    backwards, which offers even steps if it does so by the jitter of stamps only.
     """
     same = trajectory[1:] == trajectory[:-1]
     steps = np.diff(time)
     back = np.flatnonzero(same & (steps < 0))
     if len(back):
         row = int(back[0]) + 1
-        raise LogError(
+        places = (
             f"{source}: time goes backwards in {len(back)} place(s), first in row {row} "
-            f"({time[row]:.6g} s after {time[row - 1]:.6g} s, trajectory {trajectory[row]}). If a "
-            "new recording begins there, give the rows a trajectory column; if the rows are out "
-            "of order, sort them by time."
+            f"({time[row]:.6g} s after {time[row - 1]:.6g} s, trajectory {trajectory[row]})"
+        )
+        if stamps_jitter(time, trajectory):
+            raise LogError(
+                f"{places}, by no more than a few steps: the stamps jitter, or rows are out of "
+                "order. If the rows are in the order of the samples, which were taken at even "
+                "steps: --clock regular (in Python: clock='regular'); otherwise sort them by time."
+            )
+        raise LogError(
+            f"{places}. If a new recording begins there, give the rows a trajectory column; if the "
+            "rows are out of order, sort them by time."
         )
     advances: np.ndarray = np.r_[True, ~(same & (steps == 0))]
     return advances

@@ -169,3 +169,13 @@ def suggest(word: object, names: Iterable[str], cutoff: float = 0.6) -> str:
     tried = [name for name in islice(names, TRIED) if len(name) <= LONGEST_TRIED]
     close = difflib.get_close_matches(str(word)[:LONGEST_TRIED], tried, n=1, cutoff=cutoff)
     return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def span_told(start: float, end: float, digits: int = 1) -> str:
+    """A time, or a range of times, in s, with some digits after the point.
+
+    >>> span_told(61.88, 61.92), span_told(7.7, 7.9)
+    ('at 61.9 s', 'from 7.7 to 7.9 s')
+    """
+    first, last = f"{start:.{digits}f}", f"{end:.{digits}f}"
+    return f"at {last} s" if first == last else f"from {first} to {last} s"

@@ -32,6 +32,12 @@ def test_no_recognised_columns(saved):
         read_log(saved(odd))
 
 
+def test_numbered_columns_are_offered_as_positions(saved):
+    odd = LOG.rename(columns={f"q{k}": f"turn_A{k}" for k in (1, 2)})
+    with pytest.raises(LogError, match=r"Name them with --columns 'q=turn_A\{i\}'"):
+        read_log(saved(odd))
+
+
 def test_duplicated_columns(tmp_path):
     twice = pd.concat([LOG, LOG[["q1"]]], axis=1)
     twice.to_csv(tmp_path / "log.csv", index=False)

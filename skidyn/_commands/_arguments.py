@@ -181,7 +181,11 @@ def _with_column_remedies(fix: Any) -> None:
         metavar="dq2",
         help="velocities that are replaced by differentiated positions; dq for all",
     )
-    fix.add_argument("--unwrap", action="store_true", help="remove jumps by whole turns")
+    fix.add_argument(
+        "--unwrap",
+        action="store_true",
+        help="remove jumps by whole turns, or by the range of a counter",
+    )
     fix.add_argument(
         "--torque-sign",
         choices=("recorded", "command"),

@@ -72,13 +72,13 @@ def _with_remedies(words: Sequence[str], remedies: Sequence[str]) -> list[str]:
     """The arguments of a command with the options that correct its log.
 
     A value of an option that is present already is joined with its value, because only the last of
-    two options with one name counts.
+    two options with one name counts; an option without a value is given once.
     """
     fixed = list(words)
     for remedy in remedies:
         flag, _, value = remedy.partition(" ")
         if value and flag in fixed[:-1]:
             fixed[fixed.index(flag) + 1] += f",{value}"
-        else:
+        elif value or flag not in fixed:
             fixed += [flag, value] if value else [flag]
     return fixed

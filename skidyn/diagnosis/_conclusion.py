@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
-from skidyn._text import joints_told, listed
+from skidyn._text import joints_told, listed, span_told
 from skidyn.diagnosis._confidence import confidence, mostly_stays
 from skidyn.diagnosis._constancy import Change, changes
 from skidyn.diagnosis._correction import is_physics, refitted_errors
@@ -335,7 +335,7 @@ def _episodic(
     ]
     numbers = sorted({e.trajectory for e in episodes})
     times = ", ".join(
-        f"{e.start:.2f} to {e.end:.2f} s of trajectory {e.trajectory}" for e in episodes[:4]
+        f"{span_told(e.start, e.end, 2)} of trajectory {e.trajectory}" for e in episodes[:4]
     )
     more = f" and {len(episodes) - 4} more" if len(episodes) > 4 else ""
     links = {e.link for e in episodes if e.link is not None}

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skidyn._signals import Array
-from skidyn._text import digits, listed, times, trajectories_told
+from skidyn._text import digits, listed, span_told, times, trajectories_told
 from skidyn.diagnosis._comparison import Comparison, regimes
 
 #: A joint fails where its error on judged rows exceeds the noise by this factor: logs without an
@@ -309,7 +309,7 @@ def _time_place(comparison: Comparison, judged: NDArray[np.intp], share: Array) 
         if not _stands_out(held, lasted, TIME_SHARE, TIME_ODDS):
             continue
         low, high = float(edges[first]), float(edges[last + 1])
-        where = f"from {low:.1f} to {high:.1f} s of trajectory {int(name)}"
+        where = f"{span_told(low, high)} of trajectory {int(name)}"
         place = Place(
             "time", where, min(held, 1.0), lasted, low=low, high=high, trajectories=(int(name),)
         )

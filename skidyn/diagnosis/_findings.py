@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 
 from skidyn._signals import Array
-from skidyn._text import inside, interval_told, joints_told, listed, trajectories_told
+from skidyn._text import (
+    inside,
+    interval_told,
+    joints_told,
+    listed,
+    span_told,
+    trajectories_told,
+)
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._episodes import Episode
 from skidyn.diagnosis._hypothesis import (
@@ -390,10 +397,7 @@ def spans_told(spans: Sequence[tuple[int, float, float]]) -> str:
     spans : sequence of (int, float, float)
         Recording, and time of begin and end in it, s; at least one.
     """
-    times = [
-        f"from {start:.1f} to {end:.1f} s of trajectory {name}"
-        for name, start, end in spans[:LISTED]
-    ]
+    times = [f"{span_told(start, end)} of trajectory {name}" for name, start, end in spans[:LISTED]]
     more = len(spans) - LISTED
     if more > 0:
         times.append(f"at {more} other time{'s' if more > 1 else ''}")

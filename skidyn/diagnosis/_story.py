@@ -25,6 +25,7 @@ from skidyn.diagnosis._hypothesis import UNKNOWN
 from skidyn.diagnosis._rule import GUESS
 from skidyn.diagnosis._servo_motion import servo_motion_told
 from skidyn.effects import get_effect
+from skidyn.measurement import names_in_doubt
 
 if TYPE_CHECKING:
     from skidyn.diagnosis._findings import Finding
@@ -44,6 +45,8 @@ UNTOLD = ("trajectories", "trajectory")
 TOLD = {1: 3, 2: 2, 3: 1}
 #: Number of joints whose sizes are shown in one line.
 LISTED = 2
+#: Check of the scale of torques: at another one, noise and friction of joints mean nothing.
+OF_SCALE = "torque_scale"
 #: Most findings in a headline.
 SHORT = 2
 
@@ -70,6 +73,8 @@ def story(diagnosis: Diagnosis) -> dict[str, Any]:
     cards = [_line(diagnosis, k, rows) for k in range(len(diagnosis.findings))]
     mark, headline, text = _verdict(rows, cards, diagnosis.noise_is_coloured)
     doubts = [str(check) for check in diagnosis.checks if check.certainty == "suspected"]
+    if mark == SOUND and _decisive(diagnosis):
+        headline = "No effect is judged until this doubt about the log is resolved"
     motion = servo_motion_told(diagnosis.servo_motion, diagnosis.findings)
     if motion is not None and motion["findings"]:
         shown = listed([*map(_what_and_where, motion["findings"])])
@@ -90,6 +95,13 @@ def story(diagnosis: Diagnosis) -> dict[str, Any]:
         "warnings": [note for note in diagnosis.warnings if note not in doubts],
         "servo_motion": motion,
     }
+
+
+def _decisive(diagnosis: Diagnosis) -> bool:
+    """Whether a doubt about the log could hide an effect, be one, or is about all torques."""
+    certain = any(check.certainty == "certain" for check in diagnosis.checks)
+    of_scale = any(c.check == OF_SCALE and c.certainty != "noted" for c in diagnosis.checks)
+    return certain or of_scale or bool(names_in_doubt(diagnosis.checks))
 
 
 def joint_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
@@ -287,11 +299,12 @@ def _together(group: Sequence[dict[str, Any]]) -> dict[str, Any]:
     joints = sorted({joint for card in group for joint in card["joints"]})
     best = max(group, key=lambda card: card["fell"])
     at = _first_clear([list(card["clear"].values()) for card in group])
-    sizes_told = [
-        f"{list(card['clear'])[at]} (joint {card['joints'][0]}{card['only']})"
-        for card in sorted(group, key=lambda card: card["joints"])
-        if len(card["clear"]) > at
-    ]
+    by_site: dict[str, list[str]] = {}
+    for card in sorted(group, key=lambda card: card["joints"]):
+        if len(card["clear"]) > at:
+            site = f"{joints_told(card['joints'])}{card['only']}"
+            by_site.setdefault(site, []).append(list(card["clear"])[at])
+    sizes_told = [f"{listed(own)} ({site})" for site, own in by_site.items()]
     more = len(sizes_told) - LISTED
     change = best["change"]
     return {
@@ -360,10 +373,12 @@ def sure(finding: Finding) -> str:
     share = confidence(finding)
     family = finding.title.partition(", best described by ")
     named = f" that it is {inside(family[0])}" if family[1] else ""
-    named += " and acts on these joints" * bool(finding.elsewhere)
+    if finding.elsewhere:
+        acts = f"acts on {'this joint' if len(finding.joints) == 1 else 'these joints'}"
+        named = f"{named} and {acts}" if named else f" that it {acts}"
     text = "" if share is None else f"confidence {_percent(share)}{named}"
     if finding.elsewhere:
-        sites = f"on {sites_told(finding.elsewhere)} it would explain the data equally well"
+        sites = f"on {sites_told(finding.elsewhere)}, it would explain the data equally well"
         text += f"{'; ' if text else ''}{sites}"
     if finding.rivals:
         rivals = listed([rival_title(kind) for kind in finding.rivals], "or")

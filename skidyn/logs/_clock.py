@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from skidyn._checks import stamps_jitter
 from skidyn._exceptions import LogError
 from skidyn._signals import GAP_STEPS, find_segments, rates_of, runs_of
 from skidyn.logs._bounds import MAX_BYTES
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 #: A clock is slower than a channel if its step is longer than this many of the channel's.
 SLOWER = 1.75
+#: Mean number of rows of a trajectory after which another follows, if they alternate.
+ALTERNATE = 5
 
 
 def clocks(
@@ -331,6 +334,33 @@ def _mean_around(
     return np.where(touched, np.nan, mean)
 
 
+def order_stamps(time: np.ndarray, trajectory: np.ndarray) -> tuple[np.ndarray, int]:
+    """Stamps in ascending order for rows that stay as recorded, and how many went back.
+
+    Only stamps that jitter by a few steps are ordered; those of other logs are returned as they
+    are.
+    """
+    if not stamps_jitter(time, trajectory):
+        return time, 0
+    back = int(np.sum((np.diff(time) < 0) & (trajectory[1:] == trajectory[:-1])))
+    ordered = np.array(time, dtype=float)
+    for rows in find_segments(trajectory):
+        ordered[rows] = np.sort(ordered[rows])
+    return ordered, back
+
+
+def put_together(trajectory: np.ndarray) -> np.ndarray | None:
+    """Order of rows in which those of each trajectory follow each other; None if they do.
+
+    Only trajectories that alternate in nearly every row are put together: a number that occurs
+    again later is another part of it.
+    """
+    blocks = 1 + int(np.sum(trajectory[1:] != trajectory[:-1]))
+    if blocks <= max(len(trajectory) / ALTERNATE, 2 * len(np.unique(trajectory))):
+        return None
+    return np.argsort(trajectory, kind="stable")
+
+
 def split_at_restarts(time: np.ndarray) -> tuple[np.ndarray, int]:
     """Trajectory numbers for a log whose clock restarts with every run, and the number of restarts.
 
@@ -339,6 +369,8 @@ def split_at_restarts(time: np.ndarray) -> tuple[np.ndarray, int]:
     """
     number = np.zeros(len(time), dtype=np.int64)
     begin = 0
+    if stamps_jitter(time, number):
+        return number, 0  # also in the first rows of a log
     for row in np.flatnonzero(np.diff(time) < 0) + 1:
         passed = time[row - 1] - time[begin]
         if time[row] <= time[begin] + 0.05 * passed:

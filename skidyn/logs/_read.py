@@ -141,13 +141,14 @@ def read_log(
         a diagnosis of a robot with another gravity refuses the log
         (:meth:`skidyn.robots.Robot.with_gravity`).
     unwrap : bool, default=False
-        Remove jumps by a full turn from positions; recordings are moved by whole turns to be near
-        each other.
+        Remove jumps by a full turn from positions, or by the range of a counter that overflows,
+        which is measured; recordings are moved by whole turns to be near each other.
     torque_sign : {"recorded", "command"}, default="recorded"
         ``"command"``: torques that are never negative get the sign of commanded minus measured
         position.
     clock : {"recorded", "regular"}, default="recorded"
-        ``"regular"``: samples were taken at even steps, and only the stamps jitter.
+        ``"regular"``: samples were taken at even steps, and only the stamps jitter, or are rounded;
+        rows stay in their order where stamps go back by a few steps.
     drop_repeated : bool, default=False
         Leave out rows that repeat all positions of the previous row while joints move, or all
         torques if they are reported less often.

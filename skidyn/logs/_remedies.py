@@ -379,27 +379,34 @@ def _sign_from_command(table: pd.DataFrame, n: int, notes: list[str]) -> None:
 
 
 def _unwrapped(table: pd.DataFrame, names: Sequence[str], notes: list[str]) -> pd.DataFrame:
-    """Positions without jumps by a full turn, within parts of the log and between them.
+    """Positions without jumps by a full turn, or by the range of a counter, in parts and between.
 
     A wrapped position hides in which turn a part begins. All parts are moved by whole turns to be
-    near the one of the largest range, since the range of a joint is limited.
+    near the one of the largest range, since the range of a joint is limited. The size of equal
+    jumps is measured: a counter may overflow at another range than a turn.
     """
+    from skidyn.measurement import wrap_period
+
     time, number = table["time"].to_numpy(), table["trajectory"].to_numpy()
     parts = find_segments(number, time)
     changed: dict[str, np.ndarray] = {}
     moved = 0
     others = np.zeros(len(table), dtype=bool)
+    ranges = ""
     for name in names:
         q = table[name].to_numpy(dtype=float).copy()
+        turn = wrap_period(q, number) or 2 * np.pi
         for rows in parts:
-            q[rows] = np.unwrap(q[rows])
+            q[rows] = np.unwrap(q[rows], period=turn)
         if np.array_equal(q, table[name]):
             continue
         low, high = (np.array([end(q[rows]) for rows in parts]) for end in (np.min, np.max))
         middle, widest = (low + high) / 2, int(np.argmax(high - low))
-        turns = np.round((middle - middle[widest]) / (2 * np.pi))
-        for rows, turn in zip(parts, turns, strict=True):
-            q[rows] -= 2 * np.pi * turn
+        turns = np.round((middle - middle[widest]) / turn)
+        for rows, whole in zip(parts, turns, strict=True):
+            q[rows] -= turn * whole
+        if turn != 2 * np.pi:
+            ranges += f"; those of {name} are by {turn:.6g}, the range of a counter"
         moved += int(np.count_nonzero(turns))
         others |= q != table[name].to_numpy(dtype=float)
         changed[name] = q
@@ -409,7 +416,7 @@ def _unwrapped(table: pd.DataFrame, names: Sequence[str], notes: list[str]) -> p
     )
     notes.append(
         f"unwrap: jumps by a full turn were removed from {told} in "
-        f"{int(others.sum())} of {len(table)} rows{apart}"
+        f"{int(others.sum())} of {len(table)} rows{apart}{ranges}"
     )
     return table.assign(**changed)
 
@@ -458,7 +465,7 @@ def _without_lowpass(
 
 
 def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataFrame:
-    from skidyn.measurement import idle_rows, is_held
+    from skidyn.measurement import idle_rows, is_held, lost_parts
 
     q = table[[f"q{k + 1}" for k in range(n)]].to_numpy(dtype=float)
     number = table["trajectory"].to_numpy()
@@ -473,6 +480,7 @@ def _without_repeated(table: pd.DataFrame, n: int, notes: list[str]) -> pd.DataF
         moved = np.any(q[1:] != q[:-1], axis=1) & (number[1:] == number[:-1])
         torque = table[torques].to_numpy(dtype=float)
         again |= is_held(torque, moved)
+        again |= lost_parts(q, torque, number)
         again |= idle_rows(q, dq, torque, table["time"].to_numpy(dtype=float), number)
     notes.append(f"drop_repeated: {int(again.sum())} of {len(q)} rows left out")
     return table[~again].reset_index(drop=True)

@@ -26,6 +26,8 @@ from skidyn.logs._clock import (
     align_channels,
     clocks,
     derive_velocity,
+    order_stamps,
+    put_together,
     split_at_restarts,
     split_trajectories,
 )
@@ -254,12 +256,27 @@ def _clean(
     table = handle_missing(table, [*keys, *signals], missing, match.notes, source)
     if len(table) < 2:
         raise LogError(f"{source} has {len(table)} row(s); a log needs at least two.")
-    time = table["time"].to_numpy()
     if own_trajectories:
         number = _own_numbers(table["trajectory"].to_numpy(), source)
+        together = put_together(number)
+        if together is not None:
+            table, number = table.iloc[together].reset_index(drop=True), number[together]
+            match.notes.append(
+                f"{source}: the rows of {len(np.unique(number))} trajectories alternate; those of "
+                "each were put together"
+            )
     else:
-        number = _numbers_of_runs(time, match.notes, source)
+        number = _numbers_of_runs(table["time"].to_numpy(), match.notes, source)
+    time = table["time"].to_numpy()
     table["trajectory"] = number
+    if options.remedies.clock == "regular":
+        time, back = order_stamps(time, number)
+        if back:
+            table["time"] = time
+            match.notes.append(
+                f"{source}: stamps of {back} row(s) were earlier than those of the row before; the "
+                "order of the rows was kept"
+            )
     keep = check_time_order(time, number, source)
     if not keep.all() and not _same_stamps(table, n, number, source, options):
         first = int(np.argmin(keep))
@@ -315,10 +332,19 @@ def _same_stamps(
     table: pd.DataFrame, n: int, number: np.ndarray, source: str, options: TableOptions
 ) -> int:
     """Rows that seem to repeat the previous one only because of coarse stamps."""
-    from skidyn.measurement import count_same_stamps
+    from skidyn.measurement import count_same_stamps, find_interleaved
 
     q = table[[f"q{k + 1}" for k in range(n)]].to_numpy()
-    same = count_same_stamps(table["time"].to_numpy(), q, number)
+    time = table["time"].to_numpy()
+    same = count_same_stamps(time, q, number)
+    merged = find_interleaved(time, q, number) if same else None
+    if merged is not None:
+        raise LogError(
+            f"{source}: about {merged.rows:.0f} rows share each time, and from one row to the next "
+            f"positions leap by {100 * merged.leap:.0f} % of their spread: recordings whose clock "
+            "restarts were merged and sorted by time. Give the rows a column that names the "
+            "recording (trajectory), or store every recording in a separate file."
+        )
     if same and options.remedies.clock != "regular":
         raise LogError(
             f"{source}: {same} of {len(table)} rows have the time of the previous row although "

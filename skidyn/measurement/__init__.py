@@ -23,12 +23,14 @@ from skidyn.measurement._checks import names_in_doubt as names_in_doubt
 from skidyn.measurement._clock import count_same_stamps as count_same_stamps
 from skidyn.measurement._copies import copied_rows as copied_rows
 from skidyn.measurement._influence import errors_of_fits as errors_of_fits
+from skidyn.measurement._interleaved import find_interleaved as find_interleaved
 from skidyn.measurement._leaps import find_leaps as find_leaps
 from skidyn.measurement._lowpass import without_lowpass as without_lowpass
 from skidyn.measurement._measures import (
     channel_step as channel_step,
     idle_rows as idle_rows,
     is_held as is_held,
+    lost_parts as lost_parts,
     rest_share as rest_share,
     reversals as reversals,
 )
@@ -38,3 +40,4 @@ from skidyn.measurement._servo_settings import (
 )
 from skidyn.measurement._suspicion import CERTAINTIES as CERTAINTIES, paragraphs as paragraphs
 from skidyn.measurement._torque_delay import measured_delay as measured_delay
+from skidyn.measurement._wraps import wrap_period as wrap_period

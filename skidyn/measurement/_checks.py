@@ -40,6 +40,7 @@ from skidyn.measurement._description import DescriptionLengths, DescriptionUnits
 from skidyn.measurement._differential import MotorsOfDifferential
 from skidyn.measurement._divided import DividedRecordings
 from skidyn.measurement._elapsed import LostRows
+from skidyn.measurement._external import ExternalTorque
 from skidyn.measurement._failed_reads import FailedReads
 from skidyn.measurement._gravity_of_recordings import GravityOfRecordings
 from skidyn.measurement._held import (
@@ -65,9 +66,10 @@ from skidyn.measurement._suspicion import CERTAINTIES, Suspicion
 from skidyn.measurement._torque import Columns, UnsignedTorque
 from skidyn.measurement._torque_delay import TorqueDelay
 from skidyn.measurement._torque_scale import TorqueScale
-from skidyn.measurement._units import ClockUnit, PositionUnit, WrappedPosition
+from skidyn.measurement._units import ClockUnit, PositionUnit
 from skidyn.measurement._velocity import Velocity
 from skidyn.measurement._velocity_delay import VelocityDelay
+from skidyn.measurement._wrapped import WrappedPosition
 
 UNSIGNED = UnsignedTorque()
 #: The only list of checks in skidyn.
@@ -105,6 +107,7 @@ CHECKS: tuple[Check, ...] = (
     Columns(),
     GravityOnly(),
     TorqueScale(),
+    ExternalTorque(),
     NoFriction(),
     UnexplainedTorque(),
     Bodies(),

@@ -32,9 +32,10 @@ HARM, OFF = 15.0, 0.02
 #: How many times as closely positions must follow from their neighbours with even steps for stamps
 #: without influence on the torque to be suspected.
 CLOSER = 1.1
-#: Share of long steps from which stamps may be rounded, and largest distance of rounded stamps from
-#: even ones, in steps; lost rows make the distance larger.
-MISSING, ROUNDED = 0.05, 1.5
+#: Share of long steps from which stamps may be rounded, how many times as many steps too long as
+#: too short there may be, and largest distance of rounded stamps from even ones, in steps; lost
+#: rows make the distance larger.
+MISSING, TWICE, ROUNDED = 0.05, 2.0, 1.5
 #: Share of rows that lie on a line between their neighbours.
 ON_A_LINE = 0.3
 #: Rounding error of numbers of seven digits, relative to the largest; how many times this a bend is
@@ -42,8 +43,9 @@ ON_A_LINE = 0.3
 FEW_DIGITS, CLEARLY, NOT_BENT = 2e-6, 10.0, 1.15
 #: How near the share of the other rows is to one in a whole number to be that.
 NEARLY = 0.1
-#: Share of rows with the stamp of the previous row from which the stamps are too coarse.
-SAME = 0.05
+#: Share of rows with the stamp of the previous row, although joints moved, from which the stamps
+#: are too coarse: without these rows, as many steps would miss rows as are reported.
+SAME = 0.005
 #: Share of repeated rows from which accelerations, and with them findings, are wrong.
 MANY = 0.2
 
@@ -94,7 +96,10 @@ def regular_clock(time: Array, trajectory: NDArray[np.int64], q: Array | None = 
         )
         number = np.r_[0, np.cumsum(missing)]
         longer = np.polyval(np.polyfit(number, own, 1), number)
-        rounded = np.mean(missing > 1) > MISSING and np.ptp(own - even) < ROUNDED * step
+        many = np.mean(missing > 1) > MISSING
+        # unlike a lost row, rounding makes as many steps too short as it makes too long
+        made_up = 0 < np.sum(missing - 1) <= TWICE * np.sum(np.diff(own) < step / 2)
+        rounded = (many or made_up) and np.ptp(own - even) < ROUNDED * step
         straighter = np.sum((even - own) ** 2) <= np.sum((longer - own) ** 2)
         regular[rows] = even if rounded or straighter else longer
     if len(regular):

@@ -59,6 +59,9 @@ class HeldTorque(Check):
                 remedy=remedy_of("drop_repeated", True),
             )
             return
+        if measurement.lost_torque.any():
+            yield self._lost(measurement.lost_torque)
+            return
         shares, lost = np.zeros(measurement.n_joints), measurement.clipped
         for k in range(measurement.n_joints):
             torque = measurement.torque[:, k]
@@ -74,6 +77,17 @@ class HeldTorque(Check):
                 "suspected",
                 [int(k) for k in held],
             )
+
+    def _lost(self, lost: NDArray[np.bool_]) -> Suspicion:
+        """Parts in which all torques keep their last values at once."""
+        count = int(np.sum(lost[1:] & ~lost[:-1]))
+        return self.suspicion(
+            "all torques hold their last value in parts of recordings",
+            f"in {count} parts of about {lost.sum() / count:.0f} rows, {lost.mean():.1%} of all, "
+            "they do not change although joints move: their values were lost",
+            "certain" if lost.mean() > MANY_MISSING else "suspected",
+            remedy=remedy_of("drop_repeated", True),
+        )
 
 
 def _share_held(values: Array, moved: NDArray[np.bool_], trajectory: NDArray[np.int64]) -> float:

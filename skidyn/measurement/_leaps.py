@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from skidyn.measurement._wraps import TURN, wrap_period
+
 #: Least size of a jump of a position: as a multiple of its steps before and after, as a multiple of
 #: the deviation from even motion, and as a share of its range; most joined places,
 #: as a share of the rows.
@@ -44,7 +46,7 @@ def find_leaps(q: np.ndarray, time: np.ndarray, trajectory: np.ndarray) -> np.nd
     moved = np.where(together[:, None], np.diff(q, axis=0), 0.0)
     far = np.zeros(moved.shape, dtype=bool)
     for joint in range(moved.shape[1]):
-        far[:, joint] = _jumps(moved[:, joint], q[:, joint])
+        far[:, joint] = _jumps(moved[:, joint], q[:, joint], trajectory)
     kept: list[int] = []
     back: set[int] = set()
     for row in np.flatnonzero(far.any(axis=1) & together):
@@ -97,8 +99,8 @@ def _was_held(moved: np.ndarray, row: int) -> bool:
     return bool(np.all(np.abs(moved[row]) <= FARTHER * (1 + held) * around.max(axis=0)))
 
 
-def _jumps(moved: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Steps of a position that are far longer than those before and after."""
+def _jumps(moved: np.ndarray, q: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
+    """Steps of a position that are far longer than those before and after, but for wrapped ones."""
     # not than by the recorded velocity, whose unit may be another
     around = np.stack([np.roll(moved, shift) for shift in (-3, -2, -1, 1, 2, 3)])
     most = np.abs(around).max(axis=0)
@@ -114,8 +116,9 @@ def _jumps(moved: np.ndarray, q: np.ndarray) -> np.ndarray:
     beyond = np.abs(moved - (around[2] + around[3]) / 2)
     far &= beyond > BEYOND * np.quantile(beyond, 0.995)
     far &= beyond > RANGE * np.ptp(q)
-    turns = np.abs(moved - 2 * np.pi * np.round(moved / (2 * np.pi))) < 0.05 * 2 * np.pi
-    far &= ~(turns & (np.abs(moved) > np.pi))
+    for turn in {TURN, wrap_period(q, trajectory) or TURN} if far.any() else ():
+        turns = np.abs(moved - turn * np.round(moved / turn)) < 0.05 * turn
+        far &= ~(turns & (np.abs(moved) > turn / 2))
     return np.asarray(far)
 
 

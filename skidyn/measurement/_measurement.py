@@ -24,10 +24,12 @@ from skidyn.measurement._measures import (
     held_share,
     idle_rows,
     longest_plateau_share,
+    lost_parts,
     missing_values,
     step_share,
 )
 from skidyn.measurement._results import Results
+from skidyn.measurement._wraps import TURN, wrap_period
 
 if TYPE_CHECKING:
     from skidyn.measurement._divided import Division
@@ -314,16 +316,25 @@ class Measurement:
         return {} if motion is None else odd_motion(motion)
 
     @cached_property
+    def periods(self) -> dict[int, float]:
+        """Sizes of the jumps of positions that begin anew after a range, by joint from 0."""
+        s = self.signals
+        found = {k: wrap_period(s.q[:, k], s.trajectory) for k in range(self.n_joints)}
+        return {k: period for k, period in found.items() if period is not None}
+
+    @cached_property
     def unwrapped(self) -> Array:
-        """Positions without jumps by a turn, if they stay within one.
+        """Positions without jumps by a turn, if they stay within one, or by another range.
 
         Recordings of such a position may also differ by a turn.
         """
         q = self.whole.q.copy()
-        turn = 2 * np.pi
-        for k in np.flatnonzero(~self.signals.prismatic & (np.ptp(q, axis=0) < 1.1 * turn)):
+        for k in range(self.n_joints):
+            turn = self.periods.get(k, np.nan if self.signals.prismatic[k] else TURN)
+            if not np.ptp(q[:, k]) < 1.1 * turn:
+                continue
             for rows in self.signals.segments:
-                q[rows, k] = np.unwrap(q[rows, k])
+                q[rows, k] = np.unwrap(q[rows, k], period=turn)
             if np.array_equal(q[:, k], self.whole.q[:, k]):
                 continue
             middles = [float(np.median(q[rows, k])) for rows in self.signals.segments]
@@ -376,7 +387,7 @@ class Measurement:
             return None
         stuck = [*self.stuck.values(), *self.constant.values()]
         odd = [*self.odd_motion, *(run for runs in stuck for run in runs)]
-        out = self.idle | np.isin(self.signals.trajectory, odd)
+        out = self.idle | self.lost_torque | np.isin(self.signals.trajectory, odd)
         if out.all():
             return None
         if not out.any():
@@ -473,6 +484,12 @@ class Measurement:
         """Rows at the ends of recordings in which torque was not measured."""
         s = self.signals
         return idle_rows(s.q, s.dq, self.torque, s.clock, s.trajectory)
+
+    @cached_property
+    def lost_torque(self) -> NDArray[np.bool_]:
+        """Rows inside recordings in which all torques keep their last values."""
+        s = self.signals
+        return lost_parts(s.q, self.torque, s.trajectory)
 
     @cached_property
     def missing(self) -> NDArray[np.bool_]:

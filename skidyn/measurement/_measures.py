@@ -37,6 +37,11 @@ MORE_ZEROS = 2.0
 FEW_VALUES = 64
 #: Fewest values of a torque that is not coarse.
 FINE = 50
+#: Fewest rows of one value that are a plateau of a torque.
+PLATEAU = 5
+#: How many times as long as 95 % of the parts with the same torques a part is in which these were
+#: lost, share of the torques that change before and after it, and fewest such parts.
+LOST, MOST_CHANGE, FEWEST_LOST = 4, 0.7, 2
 
 
 def channel_step(values: np.ndarray) -> float:
@@ -185,6 +190,53 @@ def idle_rows(
     return idle
 
 
+def lost_parts(position: np.ndarray, torque: np.ndarray, trajectory: np.ndarray) -> np.ndarray:
+    """Rows in parts of recordings in which all torques keep their last values, as a mask.
+
+    Parameters
+    ----------
+    position, torque : ndarray of shape (n_samples, n_joints)
+        Recorded signals.
+    trajectory : ndarray of shape (n_samples,)
+        Recording of every row.
+
+    Returns
+    -------
+    ndarray of shape (n_samples,) of bool
+        Rows after the first of every such part in which a joint moves; none for a torque that
+        keeps its values everywhere, or hardly ever.
+    """
+    lost = np.zeros(len(torque), dtype=bool)
+    changing = np.ptp(torque, axis=0) > 0
+    if changing.sum() < 2:
+        return lost
+    torque = torque[:, changing]
+    new = np.any(torque[1:] != torque[:-1], axis=1) | (trajectory[1:] != trajectory[:-1])
+    begins = np.flatnonzero(np.r_[True, new])
+    ends = np.append(begins[1:], len(torque))
+    lengths = ends - begins
+    least = max(IDLE_ROWS, LOST * float(np.quantile(lengths, 0.95)))
+    far = IDLE_WAY * np.ptp(position, axis=0)
+    # all are lost and come again at once, unlike values that each torque keeps by itself
+    changed = np.mean(torque[1:] != torque[:-1], axis=1) > MOST_CHANGE
+    parts = [
+        slice(a + 1, b)
+        for a, b in zip(begins, ends, strict=True)
+        if b - a >= least
+        and torque[a].any()
+        and np.any(np.ptp(position[a:b], axis=0) > far)
+        and 0 < a
+        and b < len(torque)
+        and changed[a - 1]
+        and changed[b - 1]
+        and trajectory[a - 1] == trajectory[a] == trajectory[b]
+    ]
+    if len(parts) >= FEWEST_LOST:
+        for part in parts:
+            lost[part] = True
+    return lost
+
+
 def missing_values(torque: np.ndarray, idle: np.ndarray) -> np.ndarray:
     """Zeros beside which the torque is not small, as a mask of shape (n_samples, n_joints).
 
@@ -237,18 +289,36 @@ def reversals(velocity: np.ndarray, segments: Sequence[slice]) -> int:
 
 
 def longest_plateau_share(torque: np.ndarray, segments: Sequence[slice]) -> float:
-    """Share of rows in runs of five or more at the extreme value of the torque."""
+    """Share of rows in runs of five or more at the extreme value of the torque.
+
+    A torque that keeps other values for as long, as after a median filter, or while values are
+    lost, keeps its extreme ones without any limit: these recur, or last longer, at a limit.
+    """
     span = np.ptp(torque)
     if span == 0:
         return 1.0
-    at_limit = (torque >= torque.max() - 1e-6 * span) | (torque <= torque.min() + 1e-6 * span)
-    at_limit &= torque != 0  # the smallest magnitude is not a limit
-    rows = 0
+    high = torque >= torque.max() - 1e-6 * span
+    low = torque <= torque.min() + 1e-6 * span
+    # the smallest magnitude is not a limit
+    limits = [_plateaus(side & (torque != 0), segments) for side in (high, low)]
+    if not any(map(len, limits)):
+        return 0.0
+    same = np.zeros(len(torque), dtype=bool)
+    same[1:] = torque[1:] == torque[:-1]
+    others = 1 + _plateaus(same & ~(high | low), segments, PLATEAU - 1)
+    longest = int(others.max(initial=0))
+    rows = sum(x.sum() for x in limits if len(x) > 1 or x.max(initial=0) > longest)
+    return float(rows) / len(torque)
+
+
+def _plateaus(values: np.ndarray, segments: Sequence[slice], least: int = PLATEAU) -> np.ndarray:
+    """Lengths of the runs of true values, of at least some length, within segments."""
+    lengths = [np.zeros(0, dtype=int)]
     for part in segments:
-        begins, ends = runs_of(at_limit[part])
-        lengths = ends - begins
-        rows += int(lengths[lengths >= 5].sum())
-    return rows / len(torque)
+        begins, ends = runs_of(values[part])
+        lengths.append(ends - begins)
+    found = np.concatenate(lengths)
+    return np.asarray(found[found >= least])
 
 
 def excited(position: np.ndarray, velocity: np.ndarray, segments: Sequence[slice]) -> bool:

@@ -29,9 +29,8 @@ from skidyn.measurement._rows import running_mean, smoothed
 from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque_delay import measured_delay
 
-#: Standard deviations of the smoothing that are tried, s (where the last one is best, the torque is
-#: merely slow), and ways of presliding, rad (a tenth in
-#: metres).
+#: Standard deviations of the smoothing that are tried, s (where the last one is best, the torque
+#: may merely be slow), and ways of presliding, rad (a tenth in metres).
 WIDTHS = 0.01 * 2.0 ** np.arange(5)
 WAYS = np.array([0.001 * 2.0**k for k in range(8)])
 #: Speeds, rad/s (a tenth in m/s), below which friction fades or grows, and by how many times.
@@ -47,6 +46,11 @@ FAST = 0.03
 #: whose friction shows how it turns that must agree on a width, and at least how many; the shortest
 #: width that is no matter of samples, s.
 WORD, LEAST, AGREEING, JOINTS, SHORTEST = 2.0, 15.0, 0.6, 2, 0.05
+#: The same of one joint at the last width: over the time around a reversal, friction is then nearly
+#: a line, which any slow torque may be.
+SURELY = 40.0
+#: Length of a filter over its standard deviation.
+LENGTH = 2.5
 #: Delay of the torque, s, that smoothing does not make.
 LATE = 0.012
 #: Samples of a spectrum, lower ends of its bands at half of the highest frequency and below it, as
@@ -87,8 +91,8 @@ class Turns:
     @property
     def tells(self) -> bool:
         """Whether smoothing gains, and at a width that is reported."""
-        reported = WIDTHS[self.width] >= SHORTEST and self.width < len(WIDTHS) - 1
-        return bool(reported) and self.gain > WORD
+        least = SURELY if self.width == len(WIDTHS) - 1 else WORD
+        return bool(WIDTHS[self.width] >= SHORTEST) and self.gain > least
 
 
 class SmoothedTorque(Check):
@@ -132,8 +136,10 @@ class SmoothedTorque(Check):
             return
         if not found[alike[0]].tells:
             return
+        widest = common == len(WIDTHS) - 1
+        over = 1e3 * LENGTH * WIDTHS[common - widest]
         yield self.suspicion(
-            f"the torque was smoothed over about {1e3 * 2.5 * WIDTHS[common]:.0f} ms",
+            f"the torque was smoothed over about {over:.0f} ms{' or more' * widest}",
             f"friction reverses gradually before and after the joints do, equally on {len(alike)} "
             f"of {len(found)} joints whose friction shows its reversals, which improves the fit "
             f"by {total:.0f} (log-likelihood) over any friction that reverses with the joint; "
@@ -213,7 +219,9 @@ def at_turns(signals: Signals, torque: Array, joint: int, *, others: bool = True
     places = places[:: 1 + len(places) // MOST]
     index = np.array([np.arange(part.start, part.stop) for part in places])
     sign = np.sign(dq)
-    forms = [sign[index], *(_smoothed(sign, signals, index, width / step) for width in WIDTHS)]
+    forms = [sign[index]]
+    forms += [_smoothed(sign, signals, index, _bell(width / step)) for width in WIDTHS]
+    forms += [_smoothed(sign, signals, index, _box(width / step)) for width in WIDTHS]
     if others:
         dahl = get_effect("dahl")
         ways = (WAYS * float(signals.unit[joint])).tolist()
@@ -230,14 +238,25 @@ def at_turns(signals: Signals, torque: Array, joint: int, *, others: bool = True
     # neighbouring samples are alike, in all forms as in the best one
     alike = float(np.clip(rest[1:] @ rest[:-1] / (rest @ rest + 1e-300), 0.0, 0.95)) * others
     values = np.array([value for value, _ in fits]) * (1 - alike) / (1 + alike)
-    step_value, smooth, other = np.split(values, [1, 1 + len(WIDTHS)])
+    step_value, bell, box, other = np.split(values, 1 + len(WIDTHS) * np.arange(3))
+    smooth = np.maximum(bell, box)  # of a filter, or of a running mean
     return Turns(float(step_value[0]), smooth, float(other.max(initial=-np.inf)))
 
 
-def _smoothed(values: Array, signals: Signals, index: NDArray[np.int64], width: float) -> Array:
-    """Values through a Gaussian around some samples, those of a row within one recording."""
-    reach = int(4 * width + 0.5)  # where the filter ends
-    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+def _bell(width: float) -> Array:
+    """Kernel of a Gaussian of some standard deviation in samples, to where it ends."""
+    reach = int(4 * width + 0.5)
+    return np.asarray(np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2))
+
+
+def _box(width: float) -> Array:
+    """Kernel of a running mean with some standard deviation in samples."""
+    return np.ones(2 * max(1, round(np.sqrt(3) * width)) + 1)
+
+
+def _smoothed(values: Array, signals: Signals, index: NDArray[np.int64], kernel: Array) -> Array:
+    """Values through a filter around some samples, those of a row within one recording."""
+    reach = len(kernel) // 2
     ends = np.array([(rows.start, rows.stop - 1) for rows in signals.segments])
     own = np.searchsorted(ends[:, 0], index[:, 0], side="right") - 1
     wide = np.arange(-reach, index.shape[1] + reach) + index[:, [0]]

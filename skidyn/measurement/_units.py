@@ -13,6 +13,7 @@ from skidyn._text import trajectories_told
 from skidyn.measurement._check import Check
 from skidyn.measurement._consistency import PROPORTIONAL
 from skidyn.measurement._fits import Fits
+from skidyn.measurement._gears import factors_of_joints
 from skidyn.measurement._measurement import ALIKE, Measurement
 from skidyn.measurement._peak import climb
 from skidyn.measurement._reading import Reading
@@ -28,6 +29,17 @@ NAMES = {"deg": "degrees", "rev": "turns", "min": "minutes"}
 NEAR = 0.1
 #: How nearly a slope is that of minutes, which are but 5 % from degrees.
 MINUTES = 0.02
+#: How nearly a slope is a power of a thousand: an exact velocity has no other error than that of
+#: its unit, and 100 times rpm is but 5 % from ms.
+THOUSANDS = 0.03
+#: Least common factor of velocities, less 1, that is told; how nearly equal it must be in all
+#: joints, and how much of what makes velocities unlike the rates of positions it must be, so that
+#: it is not that of a filter, which changes fast motion more than slow one.
+SMALL, EQUALLY, CLEAN = 0.02, 0.2, 0.125
+#: Factor of velocities from which no clock of a usual rate, Hz, is off by it; ratios of gears of
+#: robots, and what they are mostly a multiple of; how nearly a factor is that of a unit before
+#: gears.
+FASTER, USUAL_RATES, RATIOS, ROUND_RATIO, BEFORE_GEARS = 5.0, (20.0, 2e4), (20, 300), 10, 2e-3
 #: How many times its limit a position reaches that is suspicious, and that is no position.
 FAR, DISTANT = 1.5, 4.0
 #: How many times its limit the position of a sliding joint reaches that is in millimetres.
@@ -52,7 +64,7 @@ LEAST = 15.0
 
 def is_near(slope: float, factor: float) -> bool:
     """Whether a slope is that of a unit's factor."""
-    near = MINUTES if factor == 1 / 60 else NEAR
+    near = MINUTES if factor == 1 / 60 else THOUSANDS if factor in CLOCKS else NEAR
     minutes = factor == DEGREE and abs(60 * slope - 1) < MINUTES
     return bool(abs(slope / factor - 1) < near) and not minutes
 
@@ -112,6 +124,9 @@ class ClockUnit(Check):
         best = max(gains, key=lambda name: gains[name])
         others = [gain for name, gain in gains.items() if name != best]
         told = fits is not None and gains[best] - max(others) > LEAST
+        sampled = USUAL_RATES[0] <= measurement.rate <= USUAL_RATES[1]
+        if (best == "dq" if told else sampled) and shared > FASTER:
+            return self._of_motors_alone(shared, told)
         best = best if told else "time"
         what = {"time": "the clock", "dq": "velocities", "q": "positions"}
         shared = _round(shared)
@@ -124,6 +139,23 @@ class ClockUnit(Check):
             f"all joints{doubt}",
             "certain" if told else "suspected",
             remedy=remedy_of("gain", {best: value}),
+        )
+
+    def _of_motors_alone(self, shared: float, told: bool) -> Suspicion:
+        """Velocities in another unit, or before the gears, beside positions that are as named."""
+        words = ""
+        for factor, unit in ((30 / np.pi, "rpm"), (1.0, "rad/s"), (1 / DEGREE, "deg/s")):
+            ratio = ROUND_RATIO * round(shared / factor / ROUND_RATIO)
+            usual = RATIOS[0] <= ratio <= RATIOS[1]
+            if usual and abs(shared / factor / ratio - 1) < BEFORE_GEARS:
+                words = f"; with a gear of {ratio}:1, they are those of the motors in {unit}"
+                break
+        return self.suspicion(
+            "velocities are those of the motors before the gears, or in another unit",
+            f"integrated velocities are {shared:.4g} times the changes of position, equally in "
+            f"all joints, and the clock has a usual rate{words}",
+            "certain" if told else "suspected",
+            remedy=remedy_of("gain", {"dq": float(f"{1 / shared:.4g}")}),
         )
 
 
@@ -243,6 +275,8 @@ class PositionUnit(Check):
             yield self._of_motors(seen, ratio, outside, both)
         elif degrees and joints is not None and ratio is not None and gained > LEAST:
             yield self._degrees_or_motors(seen, ratio, gained, outside)
+        elif degrees and (own := _own_factors(measurement, _sized_joints(turning, joints))):
+            yield self._of_each_motor(measurement, seen, *own)
         elif degrees:
             # a single joint may have another zero, or the name of another one
             whole = joints is None or bool(np.all(largest[outside] > SEVERAL_TURNS))
@@ -274,6 +308,23 @@ class PositionUnit(Check):
             "certain",
             np.flatnonzero(outside),
             remedy_of("gain", dict.fromkeys(both, value)),
+        )
+
+    def _of_each_motor(
+        self, measurement: Measurement, seen: str, factors: Array, gain: float
+    ) -> Suspicion:
+        """Positions that would be in degrees by their limits, but explain no torque as such."""
+        joints = np.flatnonzero(factors != 1)
+        told = ", ".join(f"{factors[k]:.3g} on {measurement.joint(int(k))}" for k in joints)
+        return self.suspicion(
+            "positions and velocities have another factor on each joint, as those of motors before "
+            "gears of different ratios",
+            f"{seen}; as degrees they would stay within the limits, but the torque is explained "
+            f"better by {gain:.0f} (log-likelihood) if they are divided by about {told}, of which "
+            "those of light joints are uncertain; divide them by the ratios of the gears, with "
+            "their signs (--gain q1=0.01,dq1=0.01,... for a ratio of 100)",
+            "certain",
+            joints,
         )
 
     def _degrees_or_motors(
@@ -355,14 +406,34 @@ def _odd_runs(measurement: Measurement) -> dict[int, float]:
 
 def unnamed_scale(measurement: Measurement, shared: float) -> bool:
     """Whether velocities share a scale that is neither 1 nor that of a unit."""
-    known = (1.0, *CLOCKS, *VELOCITIES, *POSITIONS)
     moving = [
         r
         for (_, r), moves in zip(measurement.velocities, measurement.excited, strict=True)
         if moves
     ]
     several = len(moving) > 1 and min(moving) > PROPORTIONAL  # not of a filtered velocity
-    return several and shared > 0 and not any(abs(shared / f - 1) < NEAR for f in known)
+    if not several or not shared > 0:
+        return False
+    if abs(shared - 1) < NEAR:
+        return _is_small_scale(measurement, shared)
+    if any(is_near(shared, factor) for factor in CLOCKS):
+        return False
+    return not any(abs(shared / f - 1) < NEAR for f in (*VELOCITIES, *POSITIONS))
+
+
+def _is_small_scale(measurement: Measurement, shared: float) -> bool:
+    """Whether a common scale of velocities near 1 is that of a clock, and not that of a filter.
+
+    A clock changes all velocities by the same share. A filter of velocities or positions changes
+    fast motion more than slow one, so that it makes joints differ, and velocities less like the
+    rates of the positions.
+    """
+    off = shared - 1
+    slopes, likeness = np.transpose(
+        [v for v, moves in zip(measurement.velocities, measurement.excited, strict=True) if moves]
+    )
+    equal = np.ptp(slopes) < EQUALLY * abs(off)
+    return bool(abs(off) > SMALL and equal and np.all(1 - likeness < CLEAN * off**2))
 
 
 def gained(fits: Fits, reading: Reading) -> float:
@@ -426,6 +497,19 @@ def _gained_over_degrees(
     return there.gained_over(degrees)
 
 
+def _own_factors(measurement: Measurement, outside: list[int]) -> tuple[Array, float] | None:
+    """Factors of positions of some joints that explain far more than degrees, and their gain."""
+    fits = measurement.fits
+    if fits is None or len(outside) < 2:
+        return None
+    return factors_of_joints(fits, outside, 1 / DEGREE)
+
+
+def _sized_joints(turning: NDArray[np.bool_], joints: frozenset[int] | None) -> list[int]:
+    """Joints, from 0, whose positions have another unit; all that turn if None."""
+    return sorted(joints) if joints is not None else np.flatnonzero(turning).tolist()
+
+
 def _sized(size: float, joints: frozenset[int] | None) -> Reading:
     return Reading(size=float(size), sized=joints)
 
@@ -471,30 +555,3 @@ def _round_counts(counts: float) -> float:
     digits = 10.0 ** max(0, np.floor(np.log10(counts)) - 1)
     near = (2.0 ** round(np.log2(counts)), round(counts / digits) * digits)
     return next((x for x in near if abs(x / counts - 1) < WHOLE), counts)
-
-
-class WrappedPosition(Check):
-    """Positions that jump by a turn at its border."""
-
-    name = "wrapped_position"
-    suspects = "positions that jump by a full turn"
-
-    def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        signals = measurement.signals
-        for k in np.flatnonzero(~signals.prismatic):
-            q = signals.q[:, k]
-            for turn, unit in ((2 * np.pi, "rad"), (360.0, "degrees")):
-                leaps = [
-                    np.abs(np.abs(np.diff(q[rows])) - turn) < 0.05 * turn
-                    for rows in signals.segments
-                ]
-                count = int(sum(leap.sum() for leap in leaps))
-                if count and np.ptp(q) < 1.1 * turn:
-                    yield self.suspicion(
-                        f"the position of {measurement.joint(int(k))} is wrapped",
-                        f"it jumps by a full turn of {turn:.4g} {unit} {count} time(s)",
-                        "certain",
-                        [int(k)],
-                        remedy_of("unwrap", True),
-                    )
-                    break

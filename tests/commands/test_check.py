@@ -4,6 +4,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from skidyn import cli, datasets
@@ -68,6 +69,21 @@ def test_the_command_that_fixes_a_log_keeps_its_options(tmp_path, capsys):
 def test_an_option_that_cannot_be_met_is_refused(flipped, capsys, option, words):
     assert main(["check", flipped, *option]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_an_option_that_several_checks_ask_for_is_given_once(tmp_path, capsys):
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=3, duration=4.0).frame
+    held = np.arange(len(log))
+    for rows in log.groupby("trajectory").groups.values():
+        for start in (140, 375):
+            held[rows[start] : rows[start] + 25] = rows[start]
+    signals = [name for name in log if name not in ("time", "trajectory")]
+    log[signals] = log[signals].to_numpy()[held]
+    log.to_csv(tmp_path / "log.csv", index=False)
+    assert main(["check", str(tmp_path / "log.csv")]) == 0
+    told = capsys.readouterr().out
+    assert told.count("fix it with: --drop-repeated") > 1
+    assert told.splitlines()[-1].count("--drop-repeated") == 1
 
 
 def test_rows_that_are_left_out_are_counted(tmp_path, capsys):

@@ -5,6 +5,8 @@ import dataclasses
 
 import numpy as np
 
+from skidyn.measurement import Suspicion
+
 
 def test_says_what_is_missing_and_where_in_the_headline(missing):
     story = missing.story()
@@ -154,3 +156,20 @@ def test_the_headline_counts_effects_in_words(missing):
     )
     assert headline(unknown, one, one).startswith("An unknown effect is missing: unknown")
     assert headline(missing.findings[0], one, one).startswith("1 known effect is missing: spring")
+
+
+def test_nothing_is_judged_beside_a_doubt_that_could_hide_an_effect(complete):
+    doubt = Suspicion("torque_scale", "torques look like currents", "10 times", "suspected")
+    story = dataclasses.replace(complete, checks=[doubt]).story()
+    assert story["headline"] == "No effect is judged until this doubt about the log is resolved"
+    slight = dataclasses.replace(doubt, check="coarse_position", certainty="noted")
+    story = dataclasses.replace(complete, checks=[slight]).story()
+    assert story["headline"] == "Nothing significant is missing"
+
+
+def test_other_joints_that_explain_as_much_are_a_clause(missing):
+    finding = dataclasses.replace(missing.findings[0], confidence=0.33, elsewhere=((1,),))
+    (line,) = dataclasses.replace(missing, findings=[finding]).story()["findings"]
+    assert line["sure"].startswith(
+        "confidence 33% that it acts on this joint; on joint 1, it would"
+    )

@@ -175,3 +175,63 @@ def test_velocity_does_not_cross_trajectories(read):
     np.testing.assert_allclose(log["dq1"], [5] * 4 + [-1] * 4)
     with pytest.raises(LogError, match="row 4 is isolated"):
         read(table[:5].assign(q1=0.0))
+
+
+@pytest.fixture
+def jittering():
+    """Stamps of the receiving computer, some of which are earlier than those before them."""
+    t = np.arange(500) * 0.01
+    late = np.random.default_rng(1).exponential(0.003, len(t))
+    assert np.any(np.diff(t + late) < 0)
+    return pd.DataFrame({"time": t + late, "q1": np.sin(t)})
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_stamps_that_go_back_by_jitter(read, jittering, own):
+    if own:
+        jittering = jittering.assign(trajectory=np.arange(500) // 250)
+    with pytest.raises(LogError, match="the stamps jitter.*--clock regular"):
+        read(jittering)
+    log, notes = read(jittering, clock="regular")
+    assert len(log) == 500 and log["trajectory"].nunique() == 1 + own
+    for _, run in log.groupby("trajectory"):
+        np.testing.assert_allclose(np.diff(run["time"]), 0.01, rtol=0.02)
+    np.testing.assert_allclose(log["q1"], jittering["q1"])  # in the same order
+    assert any("the order of the rows was kept" in note for note in notes)
+
+
+def test_a_new_recording_is_no_jitter(read, jittering):
+    half = pd.concat([jittering[200:400], jittering[300:500]])
+    with pytest.raises(LogError, match="If a new recording begins there"):
+        read(half, clock="regular")
+
+
+def test_recordings_that_alternate(read):
+    t = np.arange(0, 4, 0.01)
+    runs = [pd.DataFrame({"time": t, "trajectory": k, "q1": np.sin(t + k)}) for k in range(4)]
+    merged = pd.concat(runs).sort_values("time", kind="stable")
+    with pytest.raises(LogError, match="about 4 rows share each time.*names the recording"):
+        read(merged.drop(columns="trajectory"))
+    log, notes = read(merged)
+    np.testing.assert_allclose(log["q1"], pd.concat(runs)["q1"])
+    assert any("4 trajectories alternate" in note for note in notes)
+
+
+def test_stamps_that_are_rounded_to_the_step_of_the_samples(read):
+    t = np.arange(600) * 0.01 + 0.005 + 2e-4 * np.sin(np.arange(600) / 7)
+    rounded = pd.DataFrame({"time": np.round(t, 2), "q1": np.sin(t)})
+    same = int(np.sum(np.diff(rounded["time"]) == 0))
+    assert 5 < same < 60
+    with pytest.raises(LogError, match=f"{same} of 600 rows have the time of the previous row"):
+        read(rounded)
+    log, _ = read(rounded, clock="regular")
+    assert len(log) == 600
+    np.testing.assert_allclose(np.diff(log["time"]), 0.01, rtol=0.01)
+
+
+def test_repeated_rows_are_no_coarse_stamps(read):
+    t = np.arange(300) * 0.01
+    table = pd.DataFrame({"time": t, "q1": np.sin(t)})
+    again = table.loc[np.sort(np.r_[np.arange(300), np.arange(0, 300, 20)])]
+    log, notes = read(again)
+    assert len(log) == 300 and any("repeat the time" in note for note in notes)

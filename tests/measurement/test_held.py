@@ -115,3 +115,21 @@ def test_velocities_of_a_slow_bus(signals, torque, found):
 def test_positions_of_few_digits_are_not_held(signals, torque, found):
     told = {s.check for s in found(signals.with_(q=np.round(signals.q, 1)), torque)}
     assert "held_position" not in told
+
+
+def test_torques_that_are_lost_in_parts_of_a_recording(signals, torque, found, only):
+    held = torque.copy()
+    for start in range(150, 1900, 170):
+        held[start : start + 25] = held[start - 1]
+    told = found(signals, held)
+    only(told, "held_torque", "certain", "--drop-repeated")
+    assert "11 parts of about 25 rows" in told[0].evidence
+
+
+def test_torques_that_keep_values_one_by_one_are_not_lost(signals, torque, found):
+    kept = torque.copy()
+    for start in range(150, 1900, 170):
+        kept[start : start + 25, 0] = kept[start, 0]
+        kept[start + 10 : start + 35, 1] = kept[start + 10, 1]
+    told = {s.check for s in found(signals, kept)}
+    assert not told & {"held_torque", "clipped_torque"}

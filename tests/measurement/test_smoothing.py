@@ -35,11 +35,12 @@ def test_friction_that_turns_with_its_joint(effect):
     assert "smoothed_torque" not in told_of(made(effect))
 
 
-def test_friction_that_turns_before_its_joint():
+@pytest.mark.parametrize("samples", [21, 31])
+def test_friction_that_turns_before_its_joint(samples):
     frame = made(None)
     for rows in frame.groupby("trajectory").groups.values():
         for name in TORQUES:
-            values = uniform_filter1d(frame.loc[rows, name].to_numpy(), 21, mode="nearest")
+            values = uniform_filter1d(frame.loc[rows, name].to_numpy(), samples, mode="nearest")
             frame.loc[rows, name] = values
     told = told_of(frame)
     assert set(told) == {"smoothed_torque"} and told["smoothed_torque"].remedy is None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Units of time and positions, and positions that were wrapped."""
+"""Units of time and positions."""
 
 import numpy as np
 import pytest
@@ -18,13 +18,6 @@ def test_milliseconds(signals, torque, found, only):
         found(signals.with_(time=signals.time * 1e3), torque),
         *("clock_unit", "certain", "--units time=ms"),
     )
-
-
-def test_wrapped_position(signals, torque, found):
-    far = signals.with_(q=signals.q + [np.pi, 0])
-    wrapped = far.with_(q=(far.q + np.pi) % (2 * np.pi) - np.pi)
-    told = found(wrapped, torque)
-    assert "--unwrap" in {s.remedy.option for s in told if s.check == "wrapped_position"}
 
 
 def test_clock_at_another_rate(signals, torque, found, only):
@@ -96,3 +89,32 @@ def test_a_gear_is_told_from_degrees_beside_a_load(load, joints, ratio):
     assert told.check == "position_unit" and "degrees" not in told.suspicion
     value = float(told.remedy.option.split("=")[-1])
     assert value == pytest.approx(1 / ratio, rel=0.02)
+
+
+@pytest.mark.parametrize("factor", [1.1, 1.03, 0.95])
+def test_a_clock_that_is_off_by_a_little(factor, signals, torque, found, only):
+    told = found(signals.with_(time=factor * signals.time), torque)
+    only(told, "clock_unit", told[0].certainty, told[0].remedy.option)
+    name, gain = told[0].remedy.option.split("=")
+    assert name == "--gain time" and float(gain) == pytest.approx(1 / factor, rel=1e-3)
+    assert "equally in all joints" in told[0].evidence
+
+
+def test_a_smoothed_velocity_is_not_a_clock_that_is_off(signals, torque, found):
+    wide = np.ones(31) / 31
+    slow = np.column_stack([np.convolve(dq, wide, mode="same") for dq in signals.dq.T])
+    assert "clock_unit" not in {s.check for s in found(signals.with_(dq=slow), torque)}
+
+
+def test_one_velocity_at_another_scale_is_no_clock(signals, torque, found, only):
+    told = found(signals.with_(dq=signals.dq * [1.2, 1.0]), torque)
+    only(told, "velocity", "suspected", "--gain dq1=0.8333")
+
+
+def test_speeds_of_motors_are_not_milliseconds(recorded, told_of, only):
+    names = ["dq1", "dq2"]
+    frame = recorded.frame.assign(**{n: recorded.frame[n] * 3000 / np.pi for n in names})
+    told = told_of(frame)
+    only(told.values(), "clock_unit", told["clock_unit"].certainty, "--gain dq=0.001047")
+    assert "a gear of 100:1" in told["clock_unit"].evidence
+    assert "in rpm" in told["clock_unit"].evidence
