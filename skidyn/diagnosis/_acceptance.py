@@ -410,7 +410,7 @@ class JudgingSearch(ChoosingSearch):
 
     @staticmethod
     def _is_twin(rival: Hypothesis, best: Hypothesis) -> bool:
-        """Whether two explanations are as simple, as exact, and hardly differ in what they remove."""
+        """Whether two exact explanations of equally many numbers remove about equally much."""
         exact = best.kind != UNKNOWN and all(get_effect(h.kind).is_exact for h in (rival, best))
         differ = abs(float((rival.gain - best.gain).sum()))
         return exact and rival.n_parameters == best.n_parameters and differ < TWIN

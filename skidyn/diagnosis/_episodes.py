@@ -2,9 +2,9 @@
 """Intermittent torques: a push, a drag, a collision.
 
 No function of the motion describes them, and they do not affect a robust measure of the residual.
-An episode is a run of rows whose squared residual, in units of the noise of the quiet rows (and of
-that of its own recording, where this is larger), exceeds that of noise; the run with the largest sum of the excess is found first (the maximum-sum interval),
-then the next, until the sum is that of noise.
+An episode is a run of rows whose squared residual exceeds that of noise, in units of the noise of
+the quiet rows, or of its own recording where this is larger; the run with the largest sum of the
+excess is found first (the maximum-sum interval), then the next, until the sum is that of noise.
 """
 
 from __future__ import annotations

@@ -33,7 +33,6 @@ from skidyn.diagnosis._search_state import still_free
 from skidyn.diagnosis._split import recordings_with
 from skidyn.effects import Term, get_effect
 
-
 #: Share of the recordings with an effect above which it is one of all, of different sizes.
 MOSTLY = 0.5
 
@@ -127,9 +126,8 @@ class ReconsideringSearch(DuellingSearch):
         one size in all recordings, it leaves more than it removes in some of them.
         """
         names, own = self.problem.rows.recordings, grouped_by_joints(best.candidates)
-        if best.kind not in FRICTION or not all(
-            len(some) > 1 and recordings_with(best.kind, some, names).mean() > MOSTLY for some in own
-        ):
+        shares = [recordings_with(best.kind, some, names).mean() for some in own]
+        if best.kind not in FRICTION or min(map(len, own)) < 2 or min(shares) <= MOSTLY:
             return best, ()
         joints = {some[0].joints for some in own}
         plain = [c for c in self.pool if c.kind == best.kind and c.joints in joints]
@@ -192,9 +190,7 @@ class ReconsideringSearch(DuellingSearch):
                 return rival, second.candidates
         return best, ()
 
-    def _beside_earlier(
-        self, function: Hypothesis, ranking: list[Hypothesis]
-    ) -> Hypothesis | None:
+    def _beside_earlier(self, function: Hypothesis, ranking: list[Hypothesis]) -> Hypothesis | None:
         """A known effect as good as a function once an earlier finding has its shape beside it.
 
         The first of two effects of a joint was fitted to both, so that it leaves to a function what

@@ -146,7 +146,9 @@ def every_recording(problem: Problem, kinds: Iterable[str]) -> list[list[Candida
     return found
 
 
-def own_effects(problem: Problem, kinds: Iterable[str], found: Iterable[Term] = ()) -> list[Candidate]:
+def own_effects(
+    problem: Problem, kinds: Iterable[str], found: Iterable[Term] = ()
+) -> list[Candidate]:
     """Friction and offsets of the given model, which may differ in a part of the recordings.
 
     Each kind by itself, and the friction of a joint together as friction of another level.
@@ -157,6 +159,8 @@ def own_effects(problem: Problem, kinds: Iterable[str], found: Iterable[Term] = 
         Rows.
     kinds : iterable of str
         Kinds to try.
+    found : iterable of Term, optional
+        Effects that were found, of which plain friction may differ as well.
     """
     tried = set(kinds)
     own, known = {*FRICTION, "offset"} & tried, [*problem.terms, *found]
@@ -178,6 +182,8 @@ def drifting(
         Kinds to try.
     same : sequence of Candidate
         Terms of one kind on one joint, each of some recordings.
+    known : sequence of Term
+        Terms of the present model.
 
     Returns
     -------

@@ -248,7 +248,7 @@ def slight(
     errors : sequence of float
         Error of every joint with all findings, N m or N.
     """
-    remarks = {}
+    remarks: dict[Term, str] = {}
     signals = problem.signals if problem.logged is None else problem.logged
     for hypothesis in findings:
         reasons: dict[Term, str] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -43,7 +43,7 @@ class FunctionOfSignals(NamelessEffect):
     """
 
     n_signals: ClassVar[int] = 1
-    search = "screened"
+    search: ClassVar[Literal["screened", "given"]] = "screened"
     drawn = 1e-2
 
     def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
