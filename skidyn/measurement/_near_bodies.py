@@ -85,7 +85,7 @@ class NearBodies:
         if reading.gravity is not None:
             robot = replace(robot, gravity=np.asarray(reading.gravity))
         self.fits, self.signals = fits, reading.motion(fits.signals).with_(robot=robot)
-        self.gains = gains
+        self.reading, self.gains = reading, gains
         stated = np.asarray(robot.inertial_parameters, dtype=float).ravel()
         every = np.arange(stated.size)
         regressor = fits.mean_regressor(robot, self.signals, every)

@@ -10,7 +10,7 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn._text import listed
-from skidyn.measurement._changes import Change, is_oblique
+from skidyn.measurement._changes import Change, is_oblique, tilted
 from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._fits import Fits, friction
@@ -383,9 +383,17 @@ def asked_changes(measurement: Measurement, fits: Fits) -> list[Change]:
 
 
 def asked_gain(measurement: Measurement, fits: Fits) -> float:
-    """Log-likelihood gain of these changes with stated or with identified bodies."""
+    """Log-likelihood gain of these changes with stated or with identified bodies.
+
+    Or of a small tilt of the base with identified ones, which is no change but an effect, and which
+    a recording of few poses feels like another zero.
+    """
     asked = [c for c in asked_changes(measurement, fits) if not c.other]
-    return max(sum(c.gain for c in asked), sum(c.confirmed for c in asked))
+    tilt = tilted(fits, Reading(), fits.nominal(Reading()))
+    of_tilt = 0.0
+    if tilt is not None:
+        of_tilt = fits.identified(tilt).gained_over(fits.identified(Reading()))
+    return max(sum(c.gain for c in asked), sum(c.confirmed for c in asked), of_tilt)
 
 
 def _sure(changes: Iterable[Change]) -> bool:
