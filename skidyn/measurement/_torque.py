@@ -16,6 +16,7 @@ from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._fits import Fits, friction
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
+from skidyn.measurement._near_bodies import NearBodies, left_by_near_bodies
 from skidyn.measurement._reading import Reading
 from skidyn.measurement._readings import DECISIVE, HALF, find_changes
 from skidyn.measurement._robust import fit_admissible
@@ -238,6 +239,8 @@ class Columns(Check):
                 # beside other changes, or for a frame that is turned in the description, gravity
                 # may be what balances them
                 told = replace(told, certainty="suspected")
+            if kind == "zero" and not any(change.other for change in alike):
+                told = _or_another_robot(measurement, fits, told, changes[-1].reading)
             yield _one_of_two(told, alike)
 
     def _told(
@@ -371,6 +374,30 @@ def _one_of_two(told: Suspicion, changes: Iterable[Change]) -> Suspicion:
         evidence=f"{told.evidence}; the other cause, on the same joints, explains it equally well"
         + ("" if told.remedy is None else f", so {told.remedy} may be wrong"),
         certainty="noted",
+        remedy=None,
+    )
+
+
+def _or_another_robot(
+    measurement: Measurement, fits: Fits, told: Suspicion, final: Reading
+) -> Suspicion:
+    """Text of a zero; one of two causes if bodies near those of the description fit no better.
+
+    An angle of about half a turn can take the place of the lengths of another robot.
+    """
+    rows = fits.without(_lost_columns(measurement))
+    gains = np.nan_to_num(rows.nominal(final).gain)
+    near = NearBodies(rows, final, gains, rows.identified(final).inflation)
+    left = left_by_near_bodies(near)
+    if not left:
+        return told
+    times = ", ".join(f"{left[k]:.2g} times on {measurement.joint(k)}" for k in left)
+    return replace(
+        told,
+        suspicion=f"either {told.suspicion}, or the description is not of this robot",
+        evidence=f"{told.evidence}; but even so, bodies near those of the description leave more "
+        f"than any others, {times}"
+        + ("" if told.remedy is None else f", so {told.remedy} may be wrong"),
         remedy=None,
     )
 
