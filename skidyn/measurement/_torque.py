@@ -14,6 +14,7 @@ from skidyn.measurement._changes import Change, is_oblique, tilted
 from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._fits import Fits, friction
+from skidyn.measurement._gains import USUAL, known_gains
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
 from skidyn.measurement._near_bodies import NearBodies, left_by_near_bodies
@@ -386,7 +387,10 @@ def _or_another_robot(
     An angle of about half a turn can take the place of the lengths of another robot.
     """
     rows = fits.without(_lost_columns(measurement))
-    gains = np.nan_to_num(rows.nominal(final).gain)
+    known = list(known_gains(rows, final).values())
+    if known and not USUAL[0] <= np.median(known) <= USUAL[1]:
+        return told  # torques in another unit
+    gains = np.ones(rows.n_joints)
     near = NearBodies(rows, final, gains, rows.identified(final).inflation)
     left = left_by_near_bodies(near)
     if not left:
