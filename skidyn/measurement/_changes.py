@@ -16,16 +16,20 @@ from skidyn.measurement._outcome import Outcome
 from skidyn.measurement._reading import Reading
 from skidyn.robots import Robot
 
-#: Strength of gravity, and the largest tilt of a table, degrees.
+#: Strength of gravity, and the largest tilt of a table, degrees. A smaller tilt is no other reading
+#: but an effect, which a diagnosis finds.
 GRAVITY, LEAST_ANGLE = 9.81, 20.0
 #: Cosine of the angle to an axis from which gravity is along that axis.
 UPRIGHT = 0.995
 #: Cosine of the angle between the axes of two joints from which their angles add up.
 PARALLEL = 0.999
-#: Offsets of a position that are tried, rad.
-OFFSETS = np.deg2rad([-135, -90, -45, -15, 15, 45, 90, 135, 180])
+#: Offsets of a position that are tried, rad: every small one a third of the next, because a zero
+#: between them gains with the nearer one only if it is more than half as large.
+OFFSETS = np.deg2rad([-135, -90, -45, -15, -5, 5, 15, 45, 90, 135, 180])
 #: Those tried for a joint that also counts in the opposite direction, rad.
 QUARTERS = np.deg2rad([-90, 90, 180])
+
+AS_IT_IS = Reading()
 
 
 @dataclass(frozen=True)
@@ -176,6 +180,50 @@ def is_oblique(gravity: Sequence[float] | None) -> bool:
 def is_upright(gravity: Sequence[float] | None) -> bool:
     """Whether gravity is along an axis of the base."""
     return gravity is not None and float(np.max(np.abs(gravity))) > UPRIGHT * GRAVITY
+
+
+def tilted(fits: Fits, reading: Reading, here: Outcome) -> Reading | None:
+    """A reading with the small tilt of the base that explains the torque best.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    reading : Reading
+        Reading of the rows.
+    here : Outcome
+        Its fit with the bodies of the description.
+
+    Returns
+    -------
+    Reading or None
+        None if the robot has no gravity, or that which fits best is no small tilt.
+    """
+    own = np.asarray(fits.robot.gravity, dtype=float)
+    best = None if reading.gravity is not None else fitted_gravity(fits, reading, here)
+    if best is None or not own.any() or not best.any():
+        return None
+    along = best / np.linalg.norm(best)
+    cosine = float(along @ own / np.linalg.norm(own))
+    if np.rad2deg(np.arccos(np.clip(cosine, -1, 1))) >= LEAST_ANGLE:
+        return None
+    x, y, z = (float(v) for v in np.linalg.norm(own) * along)
+    return replace(reading, gravity=(x, y, z))
+
+
+def tilt_gain(fits: Fits, reading: Reading = AS_IT_IS) -> float:
+    """Log-likelihood that the stated bodies gain by a small tilt of the base; 0 without one.
+
+    Parameters
+    ----------
+    fits : Fits
+        Rows.
+    reading : Reading, optional
+        Reading of the rows; as they are by default.
+    """
+    here = fits.nominal(reading)
+    tilt = tilted(fits, reading, here)
+    return 0.0 if tilt is None else fits.nominal(tilt).gained_over(here)
 
 
 def fitted_gravity(fits: Fits, reading: Reading, here: Outcome) -> Array | None:

@@ -57,6 +57,7 @@ from skidyn.measurement._lengths import Lengths
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._odd import OddRecording
 from skidyn.measurement._odd_motion import OddMotion
+from skidyn.measurement._other_robot import OtherRobot
 from skidyn.measurement._overflow import OverflowedTorque
 from skidyn.measurement._padding import PaddedRows
 from skidyn.measurement._rate import GravityOnly
@@ -123,6 +124,7 @@ CHECKS: tuple[Check, ...] = (
     CommandedMotion(),
     JointGravity(),
     Crosstalk(),
+    OtherRobot(),
     Lengths(),
     ConstantTorque(),
     CopiedTorque(),
@@ -226,7 +228,18 @@ def names_in_doubt(found: list[Suspicion]) -> list[str]:
         Empty if there are none.
     """
     names = {check.name for check in CHECKS if check.misnames}
-    return [s.suspicion for s in found if s.check in names and s.certainty != "noted"]
+    return [
+        s.suspicion for s in found if (s.check in names or _is_zero(s)) and s.certainty != "noted"
+    ]
+
+
+def _is_zero(suspicion: Suspicion) -> bool:
+    """Whether the zero of a position is suspected, which then explains more than any effect did.
+
+    What it leaves of the torque looks like springs and payloads on the joints before it.
+    """
+    remedy = suspicion.remedy
+    return suspicion.check == "reading" and remedy is not None and "zero" in remedy.arguments
 
 
 def refuse_certain(found: list[Suspicion]) -> None:

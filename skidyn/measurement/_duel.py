@@ -7,12 +7,17 @@ only the motion, on the joints concerned. In both fits bodies may differ from th
 description: a reading that is supported only by wrong bodies has no gain, and bodies of negative
 mass cannot replace a sign. The permitted difference is the one with the largest likelihood, so that
 a description that fits to 3 % in one reading and to 30 % in another supports the first.
+
+A joint between whose encoder and link a gear gives way has another position under a weight that
+pulls to one side, as with another zero. It is compared with a zero as effects are, although its
+columns depend on the torque.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +36,13 @@ from skidyn.measurement._reading import Reading
 #: Number of effects that are examined in detail against a reading, and against a change of a single
 #: joint, for which fewer effects are possible.
 FINALISTS, OF_ONE_JOINT = 5, 4
+#: Angle for the change of the torque with a position, rad.
+SLOPE = 1e-4
 #: Penalty of each parameter of an effect in log-likelihood: half the logarithm of some 150 rows.
 COST = 2.5
+
+#: An effect with columns in one shape, and its penalty.
+Rival: TypeAlias = tuple[Effect, ExtraColumns, float]
 
 
 @dataclass(frozen=True)
@@ -73,11 +83,16 @@ def fight(fits: Fits, before: Reading, reading: Reading, joints: Sequence[int]) 
     gains = np.nan_to_num(fits.nominal(reading).gain)
     inflation = fits.identified(before).inflation
     here, there = (NearBodies(fits, r, gains, inflation) for r in (before, reading))
-    return duel_of(here, there, joints)
+    also = [] if reading.zero == before.zero else _giving_way(here)
+    return duel_of(here, there, joints, also=also)
 
 
 def duel_of(
-    here: NearBodies, there: NearBodies, joints: Sequence[int], but: Sequence[str] = ()
+    here: NearBodies,
+    there: NearBodies,
+    joints: Sequence[int],
+    but: Sequence[str] = (),
+    also: Sequence[Rival] = (),
 ) -> Duel:
     """Compare one fit with another and with the effects that could look like it.
 
@@ -89,6 +104,8 @@ def duel_of(
         Joints, from 0, on which effects are tried.
     but : sequence of str, default=()
         Kinds of effects that are not tried.
+    also : sequence of (Effect, ExtraColumns, float), default=()
+        Further effects, with their columns and penalties.
 
     Returns
     -------
@@ -99,7 +116,7 @@ def duel_of(
     duel = Duel(gain, gain)
     if gain <= 0:
         return duel  # effects only make it smaller
-    for effect, columns, cost in _likely(here, joints, but=but):
+    for effect, columns, cost in (*_likely(here, joints, but=but), *also):
         with_it = here.fit(columns).posterior
         rival = with_it - cost - plain
         if rival <= 0:
@@ -186,7 +203,7 @@ def _likely(
     joints: Sequence[int],
     rows: NDArray[np.bool_] | None = None,
     but: Sequence[str] = (),
-) -> list[tuple[Effect, ExtraColumns, float]]:
+) -> list[Rival]:
     """The most promising effects on some joints, in their best shapes, with their penalties.
 
     Where rows are given, the effects are those that may act in one recording alone, in them.
@@ -211,6 +228,32 @@ def _likely(
             promising.append((gain - cost, effect, columns, cost))
     promising.sort(key=lambda item: -item[0])
     return [(effect, columns, cost) for _, effect, columns, cost in promising[:FINALISTS]]
+
+
+def _giving_way(bodies: NearBodies) -> list[Rival]:
+    """The joint whose elasticity is most promising, of those that turn: one coefficient.
+
+    Its position differs from that of its encoder by its torque over its stiffness.
+    """
+    s, fits, reading = bodies.signals, bodies.fits, bodies.reading
+    robot, factor, tried = s.robot, Factored(bodies.plain.gram), []
+    assert robot is not None
+    still = robot.inverse_dynamics(s.q, s.dq, s.ddq, backend="once")
+    columns = [reading.torque_column(j) for j in range(fits.n_joints)]
+    for j in np.flatnonzero(~s.prismatic).tolist():
+        column, sign = columns[j]
+        q = s.q.copy()
+        q[:, j] -= SLOPE
+        slope = (robot.inverse_dynamics(q, s.dq, s.ddq, backend="once") - still) / SLOPE
+        change = fits.average(slope * (sign * fits.torque[:, [column]]))
+        size = float(np.sqrt(np.mean(change**2))) + 1e-12
+        felt = {i: bodies.gains[columns[i][0]] * change[:, [i]] / size for i in bodies.joints}
+        extra = ExtraColumns(felt, (0,), np.array([LOOSE]))
+        tried.append((bodies.promise(extra, factor), extra))
+    if not tried:
+        return []
+    _, best = max(tried, key=lambda pair: pair[0])
+    return [(get_effect("joint_elasticity"), best, COST)]
 
 
 def _shapes(

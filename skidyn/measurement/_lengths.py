@@ -83,21 +83,12 @@ class Lengths(Check):
     stage = 2
 
     def look(self, measurement: Measurement) -> Iterator[Suspicion]:
-        fits = readable_fits(measurement)
-        if fits is None or measurement.scaled or measurement.lost or measurement.smoothed:
-            return
-        if measurement.stale or measurement.computed or measurement.odd:
-            return
-        if measurement.late_position:
-            return  # poses of another time
-        if measurement.torque_scatter < NOISELESS:
-            return  # without noise, errors of the derivatives are significant
-        fits = fits.without(list(measurement.coarse_torques))  # rounding is not white noise
-        found = find_lengths(fits)
+        found = asked_lengths(measurement)
         if found is None or found.gain < (LEAST_COARSE if measurement.coarse else LEAST):
             return
         if not SHARE < np.abs(found.factors).max() < FARTHEST:
-            return
+            return  # beyond, it is another robot
+        fits = found.here.fits
         plain = fits.identified(Reading())
         confirmed = found.there.fits.identified(Reading()).gained_over(plain)
         if confirmed < CONFIRMED:
@@ -220,6 +211,27 @@ def _with_gain(near: NearBodies, k: int) -> float:
 def _before(robot: Robot, body: int) -> str:
     """Name of the joint before a body's own."""
     return robot.body_joints[int(robot.tree.parents[body])]
+
+
+def asked_lengths(measurement: Measurement) -> Stretched | None:
+    """Lengths that a measurement implies; None where its torque decides none.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Recording and robot.
+    """
+    fits = readable_fits(measurement)
+    if fits is None or measurement.scaled or measurement.lost or measurement.smoothed:
+        return None
+    if measurement.stale or measurement.computed or measurement.odd:
+        return None
+    if measurement.late_position:
+        return None  # poses of another time
+    if measurement.torque_scatter < NOISELESS:
+        return None  # without noise, errors of the derivatives are significant
+    fine = fits.without(list(measurement.coarse_torques))  # rounding is not white noise
+    return measurement.once("lengths", lambda: find_lengths(fine))
 
 
 def find_lengths(fits: Fits) -> Stretched | None:

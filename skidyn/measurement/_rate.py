@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from skidyn.measurement._changes import tilt_gain
 from skidyn.measurement._check import Check
 from skidyn.measurement._fits import Fits
 from skidyn.measurement._gains import CLEARLY, USUAL, known_gains
@@ -96,6 +97,8 @@ def other_rate(fits: Fits, odd: bool) -> float | None:
     rate = float(np.exp(log))
     if best < SURE or CLEARLY[0] < rate < CLEARLY[1]:
         return None
+    if best < tilt_gain(fits):
+        return None  # the inertia of an upright first joint is small beside gravity on a slope
     gains = list(known_gains(fits, Reading(stretch=rate)).values())
     usual = odd and len(gains) > 1 and all(USUAL[0] <= gain <= USUAL[1] for gain in gains)
     here, there = (fits.identified(Reading(stretch=x)) for x in (1.0, rate))

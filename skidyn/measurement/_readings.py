@@ -9,7 +9,13 @@ from functools import cache
 
 import numpy as np
 
-from skidyn.measurement._changes import Change, alternatives, fitted_gravity, is_upright
+from skidyn.measurement._changes import (
+    Change,
+    alternatives,
+    fitted_gravity,
+    is_upright,
+    tilt_gain,
+)
 from skidyn.measurement._duel import Duel, fight
 from skidyn.measurement._fits import Fits
 from skidyn.measurement._outcome import Outcome
@@ -32,6 +38,8 @@ TURNED = np.deg2rad(30)
 TIED, ALIKE = 3.0, 0.05
 #: Share of the gain within which another kind of change of the same joints is equally possible.
 RIVALS = 0.2
+#: Kinds of changes that turn gravity relative to links.
+TURNS_GRAVITY = ("zero", "gravity")
 #: What a change must gain with identified bodies. Negative masses could replace torque with the
 #: opposite sign or gravity that points up or is absent, so that these gain little.
 NEEDED = {
@@ -119,8 +127,9 @@ def _best(fits: Fits, reading: Reading) -> Change | None:
         best = _turned(fits, _first(accepted), accepted)
         worst = int(np.argmax(fits.nominal(best.reading).margin(here)))
         held = _against_effects(fought(best.reading, best.joints or (worst,)), best)
-        if held is not None:
-            return _or_another_last_body(fits, held)
+        held = held and _or_another_last_body(fits, held)
+        if held is not None and not _is_body(held):
+            return held
         accepted.remove(best)
     if reading != Reading():
         return None  # what is read anew already, and bodies, need no other zero
@@ -152,7 +161,25 @@ def _judged(fits: Fits, reading: Reading, here: Outcome) -> list[Change]:
         for c in judged
         if c.gain >= WEAKEST and c.drop >= LEAST_DROP and _all_gain(fits, c, reading, here)
     ]
+    judged = _but_for_tilt(fits, reading, judged)
     return sorted(judged, key=lambda c: -round(c.gain, 1))
+
+
+def _but_for_tilt(fits: Fits, reading: Reading, judged: list[Change]) -> list[Change]:
+    """Changes without zeros and other directions of gravity over which a small tilt gains.
+
+    The zero of a first joint that is not quite upright turns gravity as a tilt of the base does. A
+    tilt is no other reading but an effect, so that it is not among the changes.
+    """
+    if all(change.kind not in TURNS_GRAVITY for change in judged):
+        return judged
+    gain = tilt_gain(fits, reading)
+    # a zero of a joint with a horizontal axis is the same as a tilt where nothing turns it
+    return [
+        c
+        for c in judged
+        if c.kind not in TURNS_GRAVITY or gain - c.gain <= max(TIED, ALIKE * c.gain)
+    ]
 
 
 def _absent_gravity(
@@ -326,6 +353,13 @@ def _or_another_last_body(fits: Fits, change: Change) -> Change:
     angles = dict(change.reading.zero)
     own = [abs(angles[j]) < TURNED and not np.any(np.equal(parents, j)) for j in change.joints]
     return replace(change, other=OTHER_BODIES) if all(own) else change
+
+
+def _is_body(change: Change) -> bool:
+    """Whether a zero is as small as the usual error of the direction of a weight."""
+    if change.kind != "zero" or change.other != OTHER_BODIES:
+        return False
+    return bool(abs(change.reading.zero[-1][1]) < NOTED)
 
 
 def _or_bodies(duel: Duel, zero: Change) -> Change | None:

@@ -10,12 +10,14 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn._text import listed
-from skidyn.measurement._changes import Change, is_oblique
+from skidyn.measurement._changes import Change, is_oblique, tilted
 from skidyn.measurement._check import Check
 from skidyn.measurement._copies import copied_columns
 from skidyn.measurement._fits import Fits, friction
+from skidyn.measurement._gains import USUAL, known_gains
 from skidyn.measurement._measurement import Measurement
 from skidyn.measurement._measures import reversals
+from skidyn.measurement._near_bodies import NearBodies, left_by_near_bodies
 from skidyn.measurement._reading import Reading
 from skidyn.measurement._readings import DECISIVE, HALF, find_changes
 from skidyn.measurement._robust import fit_admissible
@@ -238,6 +240,8 @@ class Columns(Check):
                 # beside other changes, or for a frame that is turned in the description, gravity
                 # may be what balances them
                 told = replace(told, certainty="suspected")
+            if kind == "zero" and not any(change.other for change in alike):
+                told = _or_another_robot(measurement, fits, told, changes[-1].reading)
             yield _one_of_two(told, alike)
 
     def _told(
@@ -375,6 +379,33 @@ def _one_of_two(told: Suspicion, changes: Iterable[Change]) -> Suspicion:
     )
 
 
+def _or_another_robot(
+    measurement: Measurement, fits: Fits, told: Suspicion, final: Reading
+) -> Suspicion:
+    """Text of a zero; one of two causes if bodies near those of the description fit no better.
+
+    An angle of about half a turn can take the place of the lengths of another robot.
+    """
+    rows = fits.without(_lost_columns(measurement))
+    known = list(known_gains(rows, final).values())
+    if known and not USUAL[0] <= np.median(known) <= USUAL[1]:
+        return told  # torques in another unit
+    gains = np.ones(rows.n_joints)
+    near = NearBodies(rows, final, gains, rows.identified(final).inflation)
+    left = left_by_near_bodies(near)
+    if not left:
+        return told
+    times = ", ".join(f"{left[k]:.2g} times on {measurement.joint(k)}" for k in left)
+    return replace(
+        told,
+        suspicion=f"either {told.suspicion}, or the description is not of this robot",
+        evidence=f"{told.evidence}; but even so, bodies near those of the description leave more "
+        f"than any others, {times}"
+        + ("" if told.remedy is None else f", so {told.remedy} may be wrong"),
+        remedy=None,
+    )
+
+
 def asked_changes(measurement: Measurement, fits: Fits) -> list[Change]:
     """Changes to the reading of all recordings that the measurement implies."""
     return measurement.once(
@@ -383,9 +414,17 @@ def asked_changes(measurement: Measurement, fits: Fits) -> list[Change]:
 
 
 def asked_gain(measurement: Measurement, fits: Fits) -> float:
-    """Log-likelihood gain of these changes with stated or with identified bodies."""
+    """Log-likelihood gain of these changes with stated or with identified bodies.
+
+    Or of a small tilt of the base with identified ones, which is no change but an effect, and which
+    a recording of few poses feels like another zero.
+    """
     asked = [c for c in asked_changes(measurement, fits) if not c.other]
-    return max(sum(c.gain for c in asked), sum(c.confirmed for c in asked))
+    tilt = tilted(fits, Reading(), fits.nominal(Reading()))
+    of_tilt = 0.0
+    if tilt is not None:
+        of_tilt = fits.identified(tilt).gained_over(fits.identified(Reading()))
+    return max(sum(c.gain for c in asked), sum(c.confirmed for c in asked), of_tilt)
 
 
 def _sure(changes: Iterable[Change]) -> bool:

@@ -51,6 +51,12 @@ def test_what_an_effect_explains_far_better_is_not_told(arm, short):
     assert readings(pulled, arm) == []
 
 
+def test_a_joint_that_gives_way_under_its_weight_has_no_other_zero():
+    options = {"magnitude": 2.5, "n_trajectories": 5, "duration": 5.0, "random_state": 40}
+    frame = make_hidden_effect_log(ROBOT, "joint_elasticity", joints=[2], **options).frame
+    assert [s for s in readings(frame) if s.certainty != "noted"] == []
+
+
 def test_one_of_two_is_a_note():
     """Six seconds do not show whether a sign is wrong or a second spring acts."""
     frame = log_of("spring", [3], n_trajectories=2, duration=3.0, random_state=5)

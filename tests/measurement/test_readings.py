@@ -48,6 +48,30 @@ def test_a_last_body_whose_weight_points_elsewhere_is_no_certain_zero(signals, t
     assert "bodies that differ from the description" in reading.suspicion
 
 
+def test_a_zero_of_some_degrees_is_suspected():
+    log = make_hidden_effect_log(load_ur5(), None, n_trajectories=4, duration=6.0, random_state=2)
+    shifted = log.frame.assign(q2=log.frame["q2"] + np.deg2rad(5))
+    (told,) = [s for s in check_log(shifted, log.robot).checks if s.check == "reading"]
+    assert told.certainty != "noted" and told.joints == (2,)
+    name, _, angle = told.remedy.option.partition("=")
+    assert name == "--zero q2" and np.rad2deg(float(angle)) == pytest.approx(5, abs=1.5)
+
+
+def test_a_last_body_whose_weight_points_hardly_elsewhere_is_not_told(signals, torque, found):
+    told = found(signals.with_(q=signals.q + [0.0, np.deg2rad(6)]), torque)
+    assert "reading" not in {s.check for s in told}
+
+
+def test_a_small_tilt_of_the_base_is_no_zero_of_an_upright_first_joint():
+    """It is an effect, which a diagnosis finds, in all recordings and in single ones."""
+    robot = load_ur5()
+    log = make_hidden_effect_log(robot, None, n_trajectories=4, duration=6.0, random_state=2)
+    tilt = np.deg2rad(12)
+    leaning = replace(robot, gravity=9.81 * np.array([0.0, np.sin(tilt), -np.cos(tilt)]))
+    told = {s.check for s in check_log(log.frame, leaning).checks if s.certainty != "noted"}
+    assert not told & {"reading", "odd_recording", "divided_recordings"}
+
+
 def test_a_joint_that_counts_the_other_way_from_another_zero(signals, torque, found):
     sign, zero = np.array([1, -1]), np.array([0, np.pi / 2])
     turned = signals.with_(q=zero + sign * signals.q, dq=sign * signals.dq, ddq=sign * signals.ddq)
