@@ -216,6 +216,11 @@ def _accepted(fits: Fits, reading: Reading, judged: Sequence[Change], most: floa
             alike = [c for c in judged if c.kind != change.kind and _same_place(c, change)]
             within = max(TIED, RIVALS * change.gain)
             alike = [c for c in alike if change.gain - c.gain < within or _but_for_angle(c, change)]
+            if confirmed >= DECISIVE:  # bodies of any mass may tell them apart, too
+                least = confirmed - max(DECISIVE, RIVALS * confirmed)
+                alike = [
+                    c for c in alike if fits.identified(c.reading).gained_over(before) >= least
+                ]
             rivals = tuple(dict.fromkeys(c.kind for c in alike))
             accepted.append(replace(change, confirmed=confirmed, rivals=rivals))
     return accepted
