@@ -20,7 +20,8 @@ from skidyn.measurement._suspicion import Suspicion
 from skidyn.measurement._torque import readable_fits
 
 #: Spread of the torque of stated bodies over what they and friction leave, from which their share
-#: in a torque is known; fewest such shares; largest share of bodies in torques without them, those
+#: in a torque is known; fewest such shares, since the inertia of a single joint may be described
+#: wrongly by any factor; largest share of bodies in torques without them, those
 #: of large torques counting most, and in any one.
 STRONG, FEWEST, ABSENT, NOWHERE = 4.0, 3, 0.12, 0.4
 
@@ -40,7 +41,7 @@ class ExternalTorque(Check):
             return
         shares, ratios = shares_of_bodies(fits)
         known = ratios > STRONG
-        if known.sum() < min(FEWEST, fits.n_joints) or np.abs(shares[known]).max() > NOWHERE:
+        if known.sum() < FEWEST or np.abs(shares[known]).max() > NOWHERE:
             return
         held = float(np.linalg.norm((shares * ratios)[known]) / np.linalg.norm(ratios[known]))
         if held > ABSENT:
