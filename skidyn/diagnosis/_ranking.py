@@ -76,8 +76,8 @@ class RankingSearch(LineSearch):
         ranking += [self.against_functions(h, ranking) for h in lines]
         ranking += self._finals([own for of_kind in found[len(screening) :] for own in of_kind])
         ranking += self._finals(parts, refined=0)  # their shapes are refined already
-        in_time = self._finals([*spans, *courses, *sizes], refined=0)
-        ranking += [h for h in in_time if not self._follows_one_joint(h.candidates, h.gain)]
+        ranking += self._finals([*spans, *courses, *sizes], refined=0)
+        ranking = [h for h in ranking if not self._follows_one_joint(h.candidates, h.gain)]
         ranking += self._other_forms(ranking)
         ranking += self._finals(self._on_one_joint(ranking), refined=0)
         self.looked.keep("lines", chain.from_iterable(h.joints for h in lines))
@@ -448,12 +448,15 @@ class RankingSearch(LineSearch):
     def _follows_one_joint(self, own: Sequence[Candidate], gain: Array) -> bool:
         """Whether a load in intervals of many recordings, or one, explains a single joint only.
 
-        A force whose torque on several joints has the right ratios is a force; one that explains a
-        single joint has enough coefficients to follow whatever is missing there.
+        Or a force or a tilt with different sizes in many recordings. A force whose torque on
+        several joints has the right ratios is a force; one that explains a single joint has enough
+        coefficients to follow whatever is missing there.
         """
-        timed = {name for c in own for name, *_ in c.term.spans}
+        own_sizes = len(own) > 1 and not own[0].term.effect.grows
+        names = [name for c in own for name, *_ in c.term.spans]
+        names += [name for c in own for name in c.term.trajectories or ()] if own_sizes else []
         several = any(len(c.rows) > 1 for c in own)
-        if not timed or not several or 1 < len(timed) <= self.settings.most_recordings:
+        if not names or not several or 1 < len(set(names)) <= self.settings.most_recordings:
             return False
         return bool(gain.max() > ALL_LEFT * np.maximum(gain, 0.0).sum())
 
