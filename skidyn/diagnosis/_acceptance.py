@@ -451,14 +451,10 @@ class JudgingSearch(ChoosingSearch):
         if not (pairs or (gains and self.problem.rigid_body)):
             return []
         taken = {c.joints for c in best.candidates}
-
-        def form_of(c: Candidate) -> set[str]:
-            return set(c.term.effect.form_names) & set(c.term.shape)
-
-        forms = [form_of(c) for c in best.candidates]
+        forms = {c.form for c in best.candidates}
         others = self.strongest(
             lambda c: c.joints,
-            lambda c: c.kind == best.kind and c.joints not in taken and form_of(c) in forms,
+            lambda c: c.kind == best.kind and c.joints not in taken and c.form in forms,
         )
         found: list[Hypothesis] = []
         for own in pairs or gains:

@@ -71,6 +71,11 @@ class Candidate:
         """Whether the formula differs from the plain one of its kind."""
         return self.term.is_further_form
 
+    @cached_property
+    def form(self) -> frozenset[str]:
+        """Names of the shape entries by which its formula differs from the plain one."""
+        return self.term.effect.form_names & set(self.term.shape)
+
     def allows(self, coefficients: Array) -> bool:
         """Whether coefficients are physically possible; negligible ones may have any sign.
 

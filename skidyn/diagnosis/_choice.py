@@ -218,8 +218,7 @@ class ChoosingSearch(RankingSearch):
         single = within_recordings(best)
         if best.errors is None or not (best.kind == UNKNOWN or single):
             return best
-        left = best.errors.sum(0)
-        removed = left * np.expm1(np.maximum(best.gain, 0) / self._counts)
+        left, removed = self.left_and_removed(best)
         for rival in ranking[1:]:
             if rival.kind == UNKNOWN or rival.errors is None or within_recordings(rival):
                 continue
@@ -247,6 +246,22 @@ class ChoosingSearch(RankingSearch):
             if self._good_enough(errors.sum(0), left, removed, joints, left_over):
                 return rival
         return best
+
+    def left_and_removed(self, hypothesis: Hypothesis) -> tuple[Array, Array]:
+        """Held-out squared error of every joint with an explanation, and what that removes.
+
+        Parameters
+        ----------
+        hypothesis : Hypothesis
+            Explanation with held-out errors.
+
+        Returns
+        -------
+        left, removed : ndarray of shape (n_joints,)
+        """
+        assert hypothesis.errors is not None
+        left = hypothesis.errors.sum(0)
+        return left, left * np.expm1(np.maximum(hypothesis.gain, 0) / self._counts)
 
     def denied(self, name: Hypothesis, function: Hypothesis) -> bool:
         """Whether the fitted function differs from what a known effect can do.

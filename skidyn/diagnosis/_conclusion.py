@@ -200,8 +200,7 @@ def _in_time(
     taken.update(j for t in inexact for j in problem.term_rows(t))
     held = [np.inf if j in taken else EPISODE_LEAST_HELD for j in range(problem.n_joints)]
     share_held = np.array(held)
-    residual = problem.torque - result.ripple - problem.explained(result.fit)
-    loud = noise_of_recordings(problem.signals, residual)
+    loud = noise_of_recordings(problem.signals, judged.residual)
     episodes, inside = find_episodes(problem, smooth, least, share_held, loud)
     if episodes:
         real = not_of_positions(problem, result.fit, smooth, inside)

@@ -82,11 +82,11 @@ def sensor_noise(signals: Signals, residual: Array, torque: Array | None) -> Arr
     ndarray of shape (n_joints,), N m or N
         0 if a torque is constant; NaN with fewer than four samples in a row.
     """
-    near = _differences(signals, residual, 1)
+    near = _differences(signals.segments, residual, 1)
     size, smooth, distance = near.copy(), np.isfinite(near), 1
     while smooth.any() and distance <= LONGEST * signals.rate:
         distance *= 2
-        far = _differences(signals, residual, distance)
+        far = _differences(signals.segments, residual, distance)
         ends = smooth & (far <= SMOOTHED * near)  # not where recordings are too short
         size[ends] = near[ends]
         smooth &= ~ends
@@ -118,7 +118,7 @@ def noise_of_recordings(signals: Signals, residual: Array) -> dict[int, Array]:
     for rows in signals.segments:
         own.setdefault(int(signals.trajectory[rows.start]), []).append(rows)
     names, parts = list(own), list(own.values())
-    sizes = np.array([_differences_within(some, residual, 1) for some in parts])
+    sizes = np.array([_differences(some, residual, 1) for some in parts])
     known = np.isfinite(sizes)
     typical = np.array(
         [np.median(x[k]) if k.any() else 0.0 for x, k in zip(sizes.T, known.T, strict=True)]
@@ -128,11 +128,7 @@ def noise_of_recordings(signals: Signals, residual: Array) -> dict[int, Array]:
     return dict(zip(names, loud, strict=True))
 
 
-def _differences(signals: Signals, residual: Array, distance: int) -> Array:
-    return _differences_within(signals.segments, residual, distance)
-
-
-def _differences_within(segments: Iterable[slice], residual: Array, distance: int) -> Array:
+def _differences(segments: Iterable[slice], residual: Array, distance: int) -> Array:
     """Standard deviation of white noise with the third differences of samples so far apart.
 
     Shape (n_joints,), N m or N; NaN without any.

@@ -273,13 +273,14 @@ def part_candidates(
     joints : set of int
         Joints, from 0, with an effect that is significant in any part.
     """
-    problem, scan = tester.problem, PartScan(tester)
-    if len(scan.names) < FEWEST:
+    problem = tester.problem
+    if not pool or len(problem.rows.recordings) < FEWEST:
         return [], set()
+    scan = PartScan(tester)
     sites: dict[tuple[_Form, tuple[int, ...]], list[tuple[float, Candidate]]] = defaultdict(list)
     for rough, candidate in zip(scan.roughly(pool).tolist(), pool, strict=True):
         if rough > least:
-            form = candidate.kind, candidate.term.effect.form_names & set(candidate.term.shape)
+            form = candidate.kind, candidate.form
             sites[form, candidate.joints].append((rough, candidate))
     best = {
         site: [c for _, c in sorted(own, key=lambda item: -item[0])[:SHAPES]]

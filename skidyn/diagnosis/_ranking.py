@@ -170,14 +170,13 @@ class RankingSearch(LineSearch):
 
         That which removes most before its shape is refined may lead to a worse one.
         """
-        names = get_effect(hypothesis.kind).form_names
-        sites = {c.joints: names & set(c.term.shape) for c in hypothesis.candidates}
+        sites = {c.joints: c.form for c in hypothesis.candidates}
         starts: dict[tuple[frozenset[str], tuple[int, ...]], list[int]] = {}
         for i in np.argsort(-self.drops, kind="stable").tolist():
             c = self.ranked[i]
             if c.kind != hypothesis.kind or c.joints not in sites:
                 continue
-            own = starts.setdefault((frozenset(names & set(c.term.shape)), c.joints), [])
+            own = starts.setdefault((c.form, c.joints), [])
             if not own or (len(own) < STARTS and self.drops[i] > START_SHARE * self.drops[own[0]]):
                 own.append(i)
         forms: list[list[Candidate]] = []
@@ -333,8 +332,7 @@ class RankingSearch(LineSearch):
             if passes(chance):
                 return i
             if candidate.n_shapes and chance < self.settings.level:
-                names = candidate.term.effect.form_names & set(candidate.term.shape)
-                near.setdefault(names, i)
+                near.setdefault(candidate.form, i)
         model = self.blocks_with([*self.chosen, *chosen]) if near else []
         for i in near.values():
             (refined,) = refine(self.problem, model, [self.ranked[i]], self.sigma, self.target)

@@ -28,13 +28,10 @@ from skidyn.diagnosis._hypothesis import (
 from skidyn.diagnosis._profile import log_likelihood_gain, profile_error, refine
 from skidyn.diagnosis._recordings import FRICTION
 from skidyn.diagnosis._remainder import noise_level
-from skidyn.diagnosis._rule import BETWEEN, NEARLY, REMAINDER_TIMES_NOISE
+from skidyn.diagnosis._rule import BETWEEN, IN_MOST, NEARLY, REMAINDER_TIMES_NOISE
 from skidyn.diagnosis._search_state import still_free
 from skidyn.diagnosis._split import recordings_with
 from skidyn.effects import Term, get_effect
-
-#: Share of the recordings with an effect above which it is one of all, of different sizes.
-MOSTLY = 0.5
 
 
 class ReconsideringSearch(DuellingSearch):
@@ -127,7 +124,7 @@ class ReconsideringSearch(DuellingSearch):
         """
         names, own = self.problem.rows.recordings, grouped_by_joints(best.candidates)
         shares = [recordings_with(best.kind, some, names).mean() for some in own]
-        if best.kind not in FRICTION or min(map(len, own)) < 2 or min(shares) <= MOSTLY:
+        if best.kind not in FRICTION or min(map(len, own)) < 2 or min(shares) <= IN_MOST:
             return best, ()
         joints = {some[0].joints for some in own}
         plain = [c for c in self.pool if c.kind == best.kind and c.joints in joints]
@@ -199,9 +196,7 @@ class ReconsideringSearch(DuellingSearch):
         own = set(function.joints)
         if not any(h.kind != UNKNOWN and own & set(h.joints) for h in self.findings):
             return None
-        assert function.errors is not None
-        left = function.errors.sum(0)
-        removed = left * np.expm1(np.maximum(function.gain, 0) / self._counts)
+        left, removed = self.left_and_removed(function)
         for rival in self._names_on(function, ranking):
             first = self.judged(rival)
             if first is None:
@@ -219,9 +214,7 @@ class ReconsideringSearch(DuellingSearch):
 
     def _second_name(self, first: Hypothesis, function: Hypothesis) -> Hypothesis | None:
         """A known effect that together with a first one is as good as a function."""
-        assert function.errors is not None
-        left = function.errors.sum(0)
-        removed = left * np.expm1(np.maximum(function.gain, 0) / self._counts)
+        left, removed = self.left_and_removed(function)
         kept = self._state()
         self.add(first)
         self.refit()

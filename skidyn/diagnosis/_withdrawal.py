@@ -251,26 +251,27 @@ def slight(
     remarks: dict[Term, str] = {}
     signals = problem.signals if problem.logged is None else problem.logged
     for hypothesis in findings:
-        reasons: dict[Term, str] = {}
-        for candidate in hypothesis.candidates:
-            told = intervals[candidate.term]
-            found = {name: v for name, v in told.items() if isinstance(v, tuple)}
-            reason = candidate.term.effect.too_small(found, signals) or _undetermined(found)
-            if reason is not None:
-                reasons[candidate.term] = reason
-        small = [c.term for c in hypothesis.candidates if c.term in reasons]
         if is_vibration(hypothesis) and _in_the_noise(hypothesis, errors):
             small = [c.term for c in hypothesis.candidates]
-            lines = {f"{c.term.shape['frequency']:.3g}" for c in hypothesis.candidates}
+            lines = {f"{term.shape['frequency']:.3g}" for term in small}
             waves = listed(sorted(lines, key=float))
             remark = (
                 f"The torque of {joints_told(j + 1 for j in hypothesis.joints)} contains a wave of "
                 f"{waves} Hz that is smaller than the noise, such as hum in a sensor"
             )
-        elif small:
+        else:
+            reasons: dict[Term, str] = {}
+            for term in (c.term for c in hypothesis.candidates):
+                found = {name: v for name, v in intervals[term].items() if isinstance(v, tuple)}
+                reason = term.effect.too_small(found, signals) or _undetermined(found)
+                if reason is not None:
+                    reasons[term] = reason
+            if not reasons:
+                continue
+            small = list(reasons)
             where = joints_told(sorted({j for term in small for j in term.joints}))
             remark = f"{get_effect(hypothesis.kind).title} on {where}: {reasons[small[0]]}"
-        remarks |= dict.fromkeys(small, f"{remark}. {UNLISTED}") if small else {}
+        remarks |= dict.fromkeys(small, f"{remark}. {UNLISTED}")
     return remarks
 
 
@@ -279,13 +280,15 @@ def _undetermined(intervals: dict[str, tuple[float, float, float]]) -> str | Non
 
     Shapes of other effects, which do not count when an effect is found, may take its place.
     """
-    ((_, *ends),) = intervals.values() if len(intervals) == 1 else [(0.0, 1.0, 1.0)]
-    least, most = sorted(map(abs, ends))
-    if most <= UNDETERMINED * least or ends[0] * ends[1] <= 0:
+    if len(intervals) != 1:
+        return None
+    ((_, low, high),) = intervals.values()
+    least, most = sorted((abs(low), abs(high)))
+    if most <= UNDETERMINED * least or low * high <= 0:
         return None
     return (
-        f"its size is not determined beside the other effects, with an interval from {ends[0]:.2g} "
-        f"to {ends[1]:.2g}"
+        f"its size is not determined beside the other effects, with an interval from {low:.2g} to "
+        f"{high:.2g}"
     )
 
 

@@ -31,11 +31,9 @@ def _carried(signals: Signals, joint: int, shape: Mapping[str, Any]) -> Array:
 
 def _held(signals: Signals) -> Array:
     """Torque that holds the described bodies at rest, (n_samples, n_joints), N m or N."""
-    robot, rest = signals.robot, np.zeros_like(signals.q)
+    robot = signals.robot
     assert robot is not None
-    held: Array = signals.once(
-        "torque at rest", lambda: robot.inverse_dynamics(signals.q, rest, rest)
-    )
+    held: Array = signals.once("gravity torque", lambda: robot.gravity_torque(signals.q))
     return held
 
 

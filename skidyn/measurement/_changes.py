@@ -29,6 +29,7 @@ OFFSETS = np.deg2rad([-135, -90, -45, -15, -5, 5, 15, 45, 90, 135, 180])
 #: Those tried for a joint that also counts in the opposite direction, rad.
 QUARTERS = np.deg2rad([-90, 90, 180])
 
+#: Rows as they were recorded.
 AS_IT_IS = Reading()
 
 
