@@ -381,6 +381,7 @@ def read_signals(
     LogError if the torque has another shape or a value is not finite.
     """
     refuse_other_gravity(X, robot)
+    refuse_other_order(tau, robot)
     names = column_names(X)
     values = np.asarray(X.to_numpy() if hasattr(X, "to_numpy") else X)
     if values.ndim != 2:
@@ -422,6 +423,26 @@ def read_signals(
                 f"{row} ({int(bad.any(1).sum())} such rows); drop or repair them first"
             )
     return signals, torque
+
+
+def refuse_other_order(torque: Any, robot: Robot) -> None:
+    """Refuse a table of torque whose names are in another order than the joints of the robot.
+
+    >>> import pandas as pd
+    >>> from skidyn.datasets import load_planar_arm
+    >>> refuse_other_order(pd.DataFrame([[0.0, 0.0]], columns=["tau1", "tau2"]), load_planar_arm())
+    """
+    names = column_names(torque)
+    if names is None or len(names) != robot.n_joints:
+        return
+    for symbol in ([str(k + 1) for k in range(robot.n_joints)], robot.joint_names):
+        expected = ["tau" + name if name.isdigit() else "tau_" + name for name in symbol]
+        if names != expected and sorted(names) == sorted(expected):
+            raise ColumnError(
+                f"the columns of the torque are {', '.join(names)}, in another order than the "
+                f"joints of the robot ({', '.join(robot.joint_names)}); give "
+                f"table[[{', '.join(map(repr, expected))}]]"
+            )
 
 
 def refuse_other_gravity(X: Any, robot: Robot) -> None:

@@ -58,6 +58,9 @@ def test_a_log_without_torque_is_predicted_by_a_model_fitted_to_one_with(estimat
 def test_only_columns_of_torque_are_left_out(make):
     log = make({"tau1": [0.0], "q1": [0.0], "tau_filtered": [0.0], "dq1": [0.0]})
     assert list(motion_of(RBDRegressor(ROBOT), log).columns) == ["q1", "tau_filtered", "dq1"]
-    assert motion_of(RBDRegressor(ROBOT, trajectory=0), log) is log
+    with pytest.raises(ValueError, match="Give the name of the column, such as trajectory='q1'"):
+        motion_of(RBDRegressor(ROBOT, trajectory=1), log)
+    named = make({"tau_elbow": [0.0], "q_elbow": [0.0], "tau_filtered": [0.0]})
+    assert list(motion_of(RBDRegressor(ROBOT), named).columns) == ["q_elbow", "tau_filtered"]
     other = make({"tau1": [0.0], "past": [0.0]})
     assert motion_of(ELMCommittee(), other) is other

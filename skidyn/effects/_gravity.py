@@ -72,7 +72,8 @@ class BaseTilt(Effect):
             for part, fixed in zip(parts, pulls(quarter), strict=True):
                 part[:, 0] -= first @ fixed[:, 0]
         columns = {j: np.column_stack([*(p[:, j] for p in parts), 0 * first]) for j in joints}
-        columns[0][:, 2:] = first
+        if 0 in columns:
+            columns[0][:, 2:] = first
         return columns
 
     @staticmethod

@@ -43,6 +43,12 @@ def forecast_table(
         that the estimators have ``trajectory=0``); ``y`` of shape (n_rows, n_signals): the sample;
         ``rows``: their rows in `signal`. The first row of a segment has no past and is left out.
 
+    Raises
+    ------
+    ValueError
+        The signal is empty or not finite, the lengths differ, or the rows are not in the order of
+        trajectory and time.
+
     Examples
     --------
     >>> from skidyn.forecasting import forecast_table
@@ -51,10 +57,28 @@ def forecast_table(
     ([[0.0, 1.0], [0.0, 2.0]], [[2.0], [3.0]])
     """
     values = np.asarray(signal, dtype=np.float64)
+    if len(values) == 0:
+        raise ValueError("signal has no samples; a forecast needs two of a trajectory at least.")
     values = values.reshape(len(values), -1)
+    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    if len(bad):
+        raise ValueError(f"signal is not finite in row {bad[0]}; remove such rows first.")
     labels = np.zeros(len(values)) if trajectory is None else np.asarray(trajectory)
-    segments = find_segments(labels, None if time is None else np.asarray(time, dtype=float))
+    clock = None if time is None else np.asarray(time, dtype=float)
+    for name, given in (("trajectory", labels), ("time", clock)):
+        if given is not None and given.shape != (len(values),):
+            raise ValueError(
+                f"{name} has shape {given.shape}; one value for each of the {len(values)} samples "
+                "of signal is expected."
+            )
+    refuse_shuffled("forecast_table", labels, clock)
+    segments = find_segments(labels, clock)
     rows = np.concatenate([np.arange(s.start + 1, s.stop) for s in segments])
+    if len(rows) == 0:
+        raise ValueError(
+            "no sample has another one of its trajectory right before it; sort the rows by "
+            "trajectory and time."
+        )
     number = np.concatenate([np.full(s.stop - s.start - 1, k) for k, s in enumerate(segments)])
     return Bunch(X=np.c_[number, values[rows - 1]], y=values[rows], rows=rows)
 

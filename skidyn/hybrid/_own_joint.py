@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Sequence
 from numbers import Integral
@@ -158,6 +159,13 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
                 stacklevel=4,
             )
             return None
+        if joints is None and names is not None:
+            there = sum(re.fullmatch(r"q\d+", str(name)) is not None for name in names)
+            if there > n_joints:
+                raise ColumnError(
+                    f"X has the motion of {there} joints, and y the torque of {n_joints}: give the "
+                    "torque of every joint, or state whose it is, such as joint_names=['2']"
+                )
         if joints is None:
             joints = [str(j + 1) for j in range(n_joints)]
         try:

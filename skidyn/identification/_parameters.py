@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.utils.validation import _check_sample_weight
 
-from skidyn._signals import Array
+from skidyn._exceptions import EffectError
+from skidyn._signals import Array, Signals
+from skidyn.effects import Term
 from skidyn.forward import Controller
 from skidyn.identification._constraints import BodyConstraints
 from skidyn.identification._estimators import ESTIMATORS, Estimator, find_estimator
@@ -83,3 +86,32 @@ def checked_weight(sample_weight: Any, torque: Array, order: NDArray[np.int64]) 
             f"it lies between {weight.min():g} and {weight.max():g}"
         )
     return weight
+
+
+def in_weighted_trajectories(signals: Signals, weight: Array) -> NDArray[np.intp]:
+    """Rows of the trajectories that have a sample with a weight, since the others count nothing."""
+    _, place = np.unique(signals.trajectory, return_inverse=True)
+    return np.flatnonzero(np.bincount(place, weight)[place] > 0)
+
+
+def check_terms(terms: Iterable[Term], signals: Signals) -> None:
+    """Refuse effects whose signals the log lacks, or whose shape only a diagnosis searches."""
+    for term in terms:
+        effect = term.effect
+        if "temperature" in effect.needs and signals.temperature is None:
+            raise EffectError(
+                f"{term.kind} needs joint temperatures, which X lacks: add the columns temp1 .. "
+                f"temp{signals.n_joints}, degrees Celsius, or leave the effect out"
+            )
+        if "time" in effect.needs and signals.time is None:
+            raise EffectError(
+                f"{term.kind} needs times, which X lacks: add the column time, s, or leave the "
+                "effect out"
+            )
+        if term.is_open and effect.search == "spectrum":
+            name = effect.shapes[0].name
+            raise EffectError(
+                f"{term.kind} needs its shape parameter {name}, which a fit does not search: give "
+                f"Term({term.kind!r}, {list(term.joints)}, {{{name!r}: ...}}); "
+                "skidyn.diagnosis.diagnose finds it"
+            )

@@ -15,6 +15,7 @@ from sklearn.utils.metaestimators import available_if
 
 from skidyn._checks import warn_about_log
 from skidyn._columns import ColumnSpec
+from skidyn._exceptions import EffectError
 from skidyn._signals import Array, Signals
 from skidyn._validation import validate_motion
 from skidyn.effects import Term, TermSum, make_terms
@@ -41,8 +42,10 @@ from skidyn.identification._instrumental import instrument_rows
 from skidyn.identification._output_error import refine_by_simulation
 from skidyn.identification._parameters import (
     check_data,
+    check_terms,
     checked_estimator,
     checked_weight,
+    in_weighted_trajectories,
     keeps_no_rows,
 )
 from skidyn.identification._prediction import Prediction
@@ -245,7 +248,8 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
             Torque, N m or N.
         sample_weight : array-like of shape (n_samples,), default=None
             Weight of every sample. An averaged row has the mean weight of its samples; those of
-            weight 0 are left out.
+            weight 0 are left out, and so are trajectories without any other weight. With a time
+            column only ratios of weights count; without one, a sample of weight 2 counts as two.
         instruments : DataFrame or array of shape (n_samples, n_features), optional
             The columns of X along a motion whose errors are independent of those of X, such as the
             reference of the controller; for ``estimator="instrumental"`` only.
@@ -272,7 +276,14 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         self.__dict__.pop("recordings_", None)
         signals, torque, order = self._begin(X, y, first=True)
         weight = checked_weight(sample_weight, torque, order)
+        if weight is not None:
+            kept = in_weighted_trajectories(signals, weight)
+            signals, torque, order = signals.take(kept), torque[kept], order[kept]
+            weight = weight[kept]
+            if signals.time is not None:
+                weight = weight / weight[weight > 0].mean()
         terms = make_terms(self.effects, self.robot_.n_joints)
+        check_terms(terms, signals)
         self.recordings_ = remember(signals, terms)
         plain = self.parameters == "identified" and instruments is None and not method.rows
         needs_fit = any(t.effect.needs_fit or t.is_open for t in terms)
@@ -284,7 +295,7 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         others = None
         if instruments is not None:
             Z = validate_motion(self, instruments, reset=False, dtype=np.float64)
-            Z = Z[order] if len(Z) == len(order) else Z
+            Z = Z[order] if len(Z) == len(X) else Z
             others = instrument_rows(problem, fit, self._read(Z), self._smooths())
         self.rows_ = "averaged"
         self.evidence_ = Evidence.from_problem(whole, fit.terms)
@@ -426,6 +437,13 @@ class RBDRegressor(Prediction, Results, MultiOutputMixin, RegressorMixin, BaseEs
         signals, torque, _ = self._begin(X, y, first=first)
         given = self.effects if first else self.effect_terms_
         terms = linear_terms(given, self.robot_.n_joints)
+        check_terms(terms, signals)
+        asked = [(t.kind, t.joints) for t in make_terms(self.effects, self.robot_.n_joints)]
+        if asked != [(t.kind, t.joints) for t in terms]:
+            raise EffectError(
+                "the effects of the model were changed after its first part of the data, whose "
+                "evidence lacks the columns of the new ones; clone the model and start again"
+            )
         if first:
             self.rows_ = "averaged" if signals.time is not None else "samples"
         if self.rows_ == "samples":

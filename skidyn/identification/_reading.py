@@ -15,7 +15,14 @@ from skidyn._checks import warn_about_log
 from skidyn._columns import Columns, ColumnSpec, resolve_columns, trajectory_numbers
 from skidyn._exceptions import ColumnError
 from skidyn._order import has_one_motion, order_in_time
-from skidyn._signals import Array, Signals, rates_of, refuse_other_gravity, signals_from
+from skidyn._signals import (
+    Array,
+    Signals,
+    rates_of,
+    refuse_other_gravity,
+    refuse_other_order,
+    signals_from,
+)
 from skidyn._text import counted
 from skidyn._validation import validate_motion
 from skidyn.effects import Term
@@ -38,7 +45,7 @@ class Reading:
 
     def _begin(self, X: Any, y: Any, first: bool) -> tuple[Signals, Array, NDArray[np.intp]]:
         """Motion and torque of validated data in the order of time, and that order."""
-        table = X
+        table, targets = X, y
         X, y = validate_motion(
             self, X, y, reset=first, multi_output=True, y_numeric=True, dtype=np.float64
         )
@@ -47,7 +54,9 @@ class Reading:
             given = self.robot
             self.robot_ = given if isinstance(given, Robot) else Robot.from_urdf(given)
             self.columns_ = self._resolve(X.shape[1])
+            self._refuse_to_smooth()
         refuse_other_gravity(table, self.robot_)
+        refuse_other_order(targets, self.robot_)
         torque = y.reshape(len(y), -1)
         self._check_targets(torque)
         order = self._order(X)
@@ -91,6 +100,13 @@ class Reading:
             )
         return signals.with_(time=None)
 
+    def _refuse_to_smooth(self) -> None:
+        if self.smooth and self.columns_.time is None:
+            raise ColumnError(
+                "smooth=True derives accelerations along the time, which X lacks: add the column "
+                "time, s, or give smooth=None and the accelerations ddq1 .. of X"
+            )
+
     def _smooths(self) -> bool:
         if self.smooth is not None:
             return self.smooth
@@ -104,6 +120,18 @@ class Reading:
         signals = signals_from(X, self.columns_, self.robot_, to_derive=True)
         if self.columns_.ddq is not None:
             return signals
+        alone = [rows.start for rows in signals.segments if rows.stop - rows.start < 2]
+        if alone:
+            told = (
+                "has no neighbour in time, so that no acceleration follows from its velocity. Give "
+                "ddq1 .. in X, or at least two successive samples of a trajectory"
+            )
+            if len(alone) == signals.n_samples:
+                raise ColumnError(f"every row of X, such as row {alone[0]}, {told}")
+            warn_about_log(
+                f"{counted(len(alone), 'row')} of X, such as row {alone[0]}, {told}; its "
+                "acceleration is taken as zero."
+            )
         return signals.with_(ddq=_differences(signals))
 
     def _motion(self, X: Any) -> tuple[Signals, NDArray[np.intp]]:

@@ -24,6 +24,9 @@ from skidyn.measurement._suspicion import Suspicion
 RECORDINGS, FEWEST = 3, 12
 #: Share of the gravity of the stated bodies from which a recording has it, and below which not.
 HAS, LACKS = 0.6, 0.4
+#: How much the share of one that lacks it may differ from that of the others minus one: a contact
+#: that carries the tool leaves any share.
+ALIKE = 0.2
 #: Log-likelihood that gravity in the others must gain with identified bodies, and the share of the
 #: residual that it must take off on some joint.
 SURE, DROP = 40.0, 0.5
@@ -56,6 +59,10 @@ class GravityOfRecordings(Check):
         before = np.maximum(np.searchsorted(judged, runs, side="right") - 1, 0)
         lacks = np.array([shares[judged[at]] < HAS for at in before])
         if lacks.all() or not lacks.any():
+            return
+        without = [shares[run] for run in judged if shares[run] < HAS]
+        with_it = float(np.median([shares[run] for run in judged if shares[run] >= HAS]))
+        if abs(float(np.median(without)) - (with_it - 1)) > ALIKE:
             return
         lacking = runs[lacks].tolist()
         torque = fits.torque.copy()

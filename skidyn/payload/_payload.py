@@ -252,8 +252,8 @@ def identify_payload(
     Raises
     ------
     SkidynError
-        Runs cannot be used, the link is unknown, or there are neither unloaded runs nor a fitted
-        model.
+        Runs cannot be used, the link is unknown, there are neither unloaded runs nor a fitted
+        model, or the loaded runs carry less than the unloaded ones.
 
     See Also
     --------
@@ -336,6 +336,13 @@ def _estimate(runs: Runs, link: str, notes: list[str], com: Array | None = None)
     std = jackknife(fit.left_out)
     std[fit.is_open] = np.nan
     wide = interval_factor(len(fit.factors))
+    mass = float(fit.solution[0])
+    if not fit.is_open[0] and mass + wide * std[0] < 0:
+        raise SkidynError(
+            f"the loaded runs carry {-mass:.4g} ± {wide * std[0]:.2g} kg less at {link} than the "
+            "unloaded ones (or the model): exchange loaded and unloaded if they were confused, and "
+            "check the signs of torque and gravity otherwise"
+        )
     first_moment = np.where(fit.is_open[1:4], np.nan, fit.body[1:4])
     shares, share_std = _by_joint(runs, fit.body)
     robot = runs.problem.robot

@@ -205,7 +205,7 @@ def advance_channels(
     Raises
     ------
     ValueError
-        A column does not exist.
+        A column does not exist, a delay is not finite, or no row is left.
 
     Examples
     --------
@@ -224,6 +224,8 @@ def advance_channels(
             raise ValueError(f"the log has no {name}; it has {', '.join(map(str, frame.columns))}.")
         lag, growth = delay if isinstance(delay, (tuple, list)) else (delay, 0.0)
         both = float(lag), float(growth)
+        if not np.isfinite(both).all():
+            raise ValueError(f"the delay of {name} is {delay!r}; a finite number of s is expected.")
         shifts |= dict.fromkeys([name] if name in frame.columns else joints, both)
     time = frame["time"].to_numpy(dtype=float)
     runs: Any = frame["trajectory"].to_numpy() if "trajectory" in frame else np.zeros(len(frame))
@@ -237,6 +239,13 @@ def advance_channels(
             later = own + lag + growth * since
             columns[name][rows] = _read_at(own, columns[name][rows], later)
             keep[rows] &= (later >= own[0]) & (later <= own[-1])
+    if not keep.any():
+        raise ValueError(
+            "no row is left: the delays are longer than every run of samples without a gap. Delays "
+            "are in s; those given are "
+            + ", ".join(f"{name}: {lag:g} s" for name, (lag, _) in shifts.items())
+            + "."
+        )
     return frame.assign(**columns)[keep].reset_index(drop=True)
 
 

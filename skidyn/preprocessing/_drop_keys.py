@@ -12,6 +12,7 @@ from sklearn.pipeline import Pipeline, make_pipeline
 
 from skidyn._columns import ColumnSpec
 from skidyn._keys import Keys, fitted_keys, knows_keys
+from skidyn._validation import motion_of
 from skidyn.preprocessing._signals import SignalTransformer
 
 Array = NDArray[np.float64]
@@ -21,6 +22,7 @@ class DropKeys(SignalTransformer):
     """Remove the key columns from a table, before a learner that does not support them.
 
     Otherwise a learner uses the trajectory number and the time as features, and memorises the log.
+    Columns of torque, with which it would predict torque from itself, are left out as well.
     ``HybridRegressor`` and ``BLLRegressor`` remove them for their learners automatically.
 
     Parameters
@@ -51,6 +53,9 @@ class DropKeys(SignalTransformer):
     def __init__(self, *, trajectory: ColumnSpec = "auto", time: ColumnSpec = "auto") -> None:
         self.trajectory = trajectory
         self.time = time
+
+    def _table(self, X: Any) -> Any:
+        return motion_of(self, X)
 
     def _learn(self, X: Array) -> None:
         fitted_keys(self)  # raises an error for missing columns

@@ -22,6 +22,10 @@ from skidyn.preprocessing._affine import scaling_of
 Array = NDArray[np.float64]
 
 
+#: Share by which a stated rate may differ from that of the time column.
+OTHER_RATE = 0.1
+
+
 class SignalTransformer(LogTransformer):
     """Base of transformers of signals with key columns and segments."""
 
@@ -44,16 +48,37 @@ class SignalTransformer(LogTransformer):
 
 
 def _sampling_rate(X: Array, keys: Keys, segments: list[slice], rate: float | None) -> float:
-    """Samples per second, as given or from the median step of the time column."""
-    if rate is not None:
-        return float(rate)
+    """Samples per second: from the median step of the time column, or as given without one."""
     if keys.time is None:
-        raise ValueError("X has no time column; declare it, or give rate in Hz.")
+        if rate is None:
+            raise ValueError("X has no time column; declare it, or give rate in Hz.")
+        return float(rate)
     steps = np.concatenate([np.diff(X[segment, keys.time]) for segment in segments])
     steps = steps[steps > 0]
     if len(steps) == 0:
-        raise ValueError("the time column never advances; n_samples = 1 is too few for a rate.")
-    return float(1.0 / np.median(steps))
+        if rate is not None:
+            return float(rate)
+        raise ValueError(
+            "the time column never advances, so that it has no rate. Rates need two samples of a "
+            f"trajectory at least (n_samples = {len(X)} here), and times in float64: seconds "
+            "since 1970 are equal in float32."
+        )
+    found = float(1.0 / np.median(steps))
+    if rate is not None and abs(rate / found - 1) > OTHER_RATE:
+        raise ValueError(
+            f"rate={rate:g} Hz, but by the time column of X it is {found:.4g} Hz; omit rate, or "
+            "give time=None if the column is no clock in s."
+        )
+    return found
+
+
+def _rate_of_log(
+    X: Array, keys: Keys, segments: list[slice], rate: float | None, trained: float
+) -> float:
+    """Samples per second of a new log, or that in training if its rows are too few to tell."""
+    if keys.time is None or all(segment.stop - segment.start < 2 for segment in segments):
+        return trained
+    return _sampling_rate(X, keys, segments, rate)
 
 
 def segment_times(X: Array, keys: Keys, rows: slice, rate: float) -> Array:
@@ -98,7 +123,7 @@ class ButterworthFilter(SignalTransformer):
     order : int, default=4
         Order of one pass.
     rate : float, Hz, default=None
-        Sampling rate; from the time column if None.
+        Sampling rate if X has no time column, from which it is found otherwise, in every log.
     trajectory, time : int, str or None, default="auto"
         Key columns, passed on unchanged.
 
@@ -148,12 +173,13 @@ class ButterworthFilter(SignalTransformer):
         self.rate_ = _sampling_rate(X, fitted_keys(self), self._segments(X), self.rate)
 
     def _changed(self, X: Array) -> Array:
-        keys = fitted_keys(self)
+        keys, segments = fitted_keys(self), self._segments(X)
         filtered: Array = X.copy()
         features = list(keys.features)
-        for segment in self._segments(X):
+        rate = _rate_of_log(X, keys, segments, self.rate, self.rate_)
+        for segment in segments:
             filtered[segment, features] = _low_pass(
-                X[segment, features], self.cutoff, self.order, self.rate_
+                X[segment, features], self.cutoff, self.order, rate
             )
         return filtered
 
@@ -235,9 +261,10 @@ class TimeDerivative(SignalTransformer):
         self.rate_ = _sampling_rate(X, keys, self._segments(X), self.rate)
 
     def _changed(self, X: Array) -> Array:
-        keys = fitted_keys(self)
+        keys, segments = fitted_keys(self), self._segments(X)
         derivative = np.empty((len(X), len(self.columns_)))
-        for segment in self._segments(X):
+        rate = _rate_of_log(X, keys, segments, self.rate, self.rate_)
+        for segment in segments:
             values = X[segment, self.columns_]
             if len(values) < 2:
                 raise ValueError(
@@ -245,8 +272,8 @@ class TimeDerivative(SignalTransformer):
                     "Remove it, or fix the trajectory and time columns."
                 )
             if self.cutoff is not None:
-                values = _low_pass(values, self.cutoff, 4, self.rate_)
-            times = segment_times(X, keys, segment, self.rate_)
+                values = _low_pass(values, self.cutoff, 4, rate)
+            times = segment_times(X, keys, segment, rate)
             derivative[segment] = np.gradient(
                 values, times, axis=0, edge_order=2 if len(values) > 2 else 1
             )
