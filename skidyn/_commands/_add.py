@@ -7,6 +7,7 @@ import argparse
 import json
 import shlex
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skidyn._commands._arguments import JsonFile, command, with_joints, with_report
@@ -89,7 +90,8 @@ def limited_terms(path: str, kind: str, joints: Sequence[int] | None, n_joints: 
 
 
 def run(options: argparse.Namespace) -> None:
-    from skidyn.effects import get_effect, make_terms
+    from skidyn.diagnosis import SAME
+    from skidyn.effects import get_effect, make_new_terms
 
     kind, joints = options.effect, joint_numbers(options.on)
     options = recorded_options(options)
@@ -114,8 +116,9 @@ def run(options: argparse.Namespace) -> None:
         fitted = better = model.fit(frame, tau)
         stated = controller_told(controller, robot.n_joints)
     else:
-        terms = limited_terms(options.report, kind, joints, robot.n_joints) or make_terms(
-            [kind if joints is None else (kind, joints)], robot.n_joints
+        spec: Any = kind if joints is None else (kind, joints)
+        terms = limited_terms(options.report, kind, joints, robot.n_joints) or make_new_terms(
+            spec, model.effects, robot.n_joints
         )
         fitted = model.with_effects(terms).fit(frame, tau)
         better = model.with_effects(fitted.effect_terms_[-len(terms) :])
@@ -132,6 +135,9 @@ def run(options: argparse.Namespace) -> None:
         change = round(after[j] / before[j] - 1, 2) if before[j] > 0 else 0.0
         unit = "N" if robot.joint_types[j] == "prismatic" else "N m"
         told = f"{digits(before[j]):>9s} -> {digits(after[j]):>9s} {unit}"
-        print(f"  {j + 1} {name:24s} {told}  ({change + 0.0:+.0%})")
+        worse = "  worse" if after[j] > (1 + SAME) * before[j] else ""
+        print(f"  {j + 1} {name:24s} {told}  ({change + 0.0:+.0%}){worse}")
+    if options.out:
+        print(f"written: {Path(options.out).resolve()}")
     if stated is not None:
         print(f"next: the same with --controller {shlex.quote(stated)}")

@@ -60,3 +60,4 @@ from skidyn.diagnosis._separation import (
 )
 from skidyn.diagnosis._spectrum import find_lines as find_lines
 from skidyn.diagnosis._split import split_effects as split_effects
+from skidyn.diagnosis._story import SAME as SAME

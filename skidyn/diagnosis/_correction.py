@@ -17,7 +17,13 @@ from skidyn._columns import column_names
 from skidyn._signals import Array, Signals, read_signals
 from skidyn.effects import Term, make_terms
 from skidyn.evidence import Problem, make_problem
-from skidyn.identification import named_recordings, recognise, remember
+from skidyn.identification import (
+    check_terms,
+    find_terms,
+    named_recordings,
+    recognise,
+    remember,
+)
 from skidyn.robots import Robot
 
 if TYPE_CHECKING:
@@ -104,6 +110,9 @@ class CorrectedRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, B
         self.effect_terms_ = make_terms(self.effects, self.robot.n_joints)
         self.__dict__.pop("recordings_", None)
         problem = self._problem(X, torque.reshape(len(torque), -1), sample_weight)
+        check_terms(self.effect_terms_, problem.signals)
+        if any(term.is_open for term in self.effect_terms_):
+            self.effect_terms_ = list(find_terms(problem).terms)
         self.coef_ = np.zeros(0)
         if self.effect_terms_:
             self.coef_ = problem.fit(self.effect_terms_, passes=3).coefficients

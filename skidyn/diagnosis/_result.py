@@ -25,7 +25,7 @@ from skidyn.diagnosis._servo_settings import as_stated, setting_of, with_setting
 from skidyn.diagnosis._simulated import of_finding, report_of, simulated
 from skidyn.diagnosis._story import story
 from skidyn.diagnosis._unknown import UnknownTorque
-from skidyn.effects import Term, get_effect, make_terms
+from skidyn.effects import Term, get_effect, make_new_terms
 from skidyn.evidence import Problem
 from skidyn.identification import RBDRegressor
 from skidyn.measurement import Suspicion
@@ -433,8 +433,9 @@ class Diagnosis:
         Raises
         ------
         EffectError
-            Unknown kind, a joint that the robot lacks, no formula was proposed, or no such setting
-            of a servo was found.
+            Unknown kind, a joint that the robot lacks, an effect that the model has already or
+            whose signals the log lacks, no formula was proposed, or no such setting of a servo was
+            found.
         SkidynError
             ``joints`` is not a number, or several.
         """
@@ -449,7 +450,8 @@ class Diagnosis:
         if terms and (wanted is None or wanted <= {j for t in terms for j in t.joints}):
             return self._refitted(dict.fromkeys(terms))
         spec: Any = kind if joints is None else (kind, joints)
-        return self._refitted(make_terms([spec], len(self.joint_names)))
+        had = getattr(self.base_model, "effects", ())
+        return self._refitted(make_new_terms(spec, had, len(self.joint_names)))
 
     def _with_setting(self, kind: str, joints: Sequence[int] | None) -> Any:
         """The model fitted to the torque of servos with a setting that was found."""

@@ -38,6 +38,7 @@ __all__ = [
 
 # For other packages of skidyn; no part of the public interface.
 from skidyn._signals import Signals as Signals
+from skidyn.effects._catalogue import make_new_terms as make_new_terms
 from skidyn.effects._hysteresis import Law as Law, PathMemory as PathMemory
 from skidyn.effects._moments import starts as starts
 from skidyn.effects._motor_load import MotorLoadFriction as MotorLoadFriction

@@ -8,7 +8,7 @@ from typing import Any
 
 from skidyn._exceptions import EffectError
 from skidyn._joint_numbers import joint_numbers
-from skidyn._text import joints_of
+from skidyn._text import joints_of, joints_told
 from skidyn.effects._base import Effect
 from skidyn.effects._coupling import CoupledFriction, CoupledInertia, CouplingSpring
 from skidyn.effects._formula import Formula
@@ -128,6 +128,28 @@ def make_terms(specs: Iterable[TermSpec], n_joints: int) -> list[Term]:
     return terms
 
 
+def make_new_terms(spec: TermSpec, known: Iterable[TermSpec], n_joints: int) -> list[Term]:
+    """As :func:`make_terms`, for an addition to a model with known effects.
+
+    Raises
+    ------
+    EffectError
+        Also if the model has the effect already, in all recordings.
+    """
+    terms = make_terms([spec], n_joints)
+    had = {
+        (term.kind, frozenset(term.joints)) for term in make_terms(known, n_joints) if not term.when
+    }
+    twice = [term for term in terms if (term.kind, frozenset(term.joints)) in had]
+    if twice:
+        where = joints_told(sorted({joint for term in twice for joint in term.joints}))
+        raise EffectError(
+            f"the model already has {twice[0].kind} on {where}; add it on other joints, or add "
+            "another effect"
+        )
+    return terms
+
+
 def _completed(term: Term) -> Term:
     """Complete the shape of a term by the parameters that have one usual value."""
     if term.is_open:
@@ -158,8 +180,13 @@ def _expand(kind: str, joints: Sequence[int] | None, n_joints: int) -> list[Term
     _check_joints(kind, chosen, n_joints)
     if scope == "joint":
         return [Term.at(kind, (j,)) for j in chosen]
+    if scope == "pair" and n_joints < 2:
+        raise EffectError(f"{kind} couples two joints; the robot has {joints_of(n_joints)}")
     if scope == "pair" and len(chosen) != 2:
-        raise EffectError(f"{kind} couples two joints; write ({kind!r}, [5, 6])")
+        raise EffectError(
+            f"{kind} couples two joints; name both: skidyn add --joints 1,2 (in Python: "
+            f"({kind!r}, [1, 2]))"
+        )
     return [Term.at(kind, chosen)]
 
 

@@ -25,9 +25,11 @@ from skidyn.identification._consistency import (
 )
 from skidyn.identification._estimators import ESTIMATORS as ESTIMATORS, Estimator as Estimator
 from skidyn.identification._from_evidence import weighted_solution as weighted_solution
+from skidyn.identification._parameters import check_terms as check_terms
 from skidyn.identification._recordings import (
     named_recordings as named_recordings,
     recognise as recognise,
     remember as remember,
 )
 from skidyn.identification._regression import Solution as Solution
+from skidyn.identification._terms import find_terms as find_terms

@@ -36,6 +36,29 @@ def test_add_lowers_the_error_of_the_joint(diagnosed, run):
     assert ("stribeck", [2]) in [(e["kind"], e["joints"]) for e in effects]
 
 
+def test_joints_that_get_worse_are_marked_and_the_file_is_named(diagnosed, tmp_path, capsys):
+    out = tmp_path / "coupled.json"
+    words = ["add", "--from", str(diagnosed / "report.json"), "--effect", "coupling_spring"]
+    assert cli.main([*words, "--joints", "1,2", "--out", str(out)]) == cli.DONE
+    *_, written = lines = capsys.readouterr().out.splitlines()
+    assert written == f"written: {out}"
+    changes = {line: float(line.split("(")[1].split("%")[0]) for line in lines[1:-1]}
+    assert all(line.endswith("worse") == (change > 2) for line, change in changes.items())
+
+
+def test_what_cannot_be_added_is_refused(diagnosed, capsys):
+    words = ["add", "--from", str(diagnosed / "report.json"), "--effect"]
+    for effect, told in {
+        "torque_ripple": "needs its shape parameter N",
+        "temperature_friction": "needs joint temperatures",
+        "coupling_spring": "--joints 1,2",
+        "viscous": "already has viscous on joints 1 and 2",
+    }.items():
+        joints = ["--joints", "1"] if effect == "coupling_spring" else []
+        assert cli.main([*words, effect, *joints]) == cli.BAD_INPUT
+        assert told in capsys.readouterr().err
+
+
 @pytest.fixture(scope="module")
 def loaded(work, tmp_path_factory):
     """A report of a log in which some recordings carry a load."""

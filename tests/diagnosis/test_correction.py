@@ -16,6 +16,7 @@ from sklearn.preprocessing import FunctionTransformer, StandardScaler
 import skidyn
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import EffectSearchCV, diagnose
+from skidyn.exceptions import EffectError
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import TrajectoryKFold
 from skidyn.preprocessing import DropKeys, SmoothDerivatives
@@ -151,6 +152,15 @@ def test_a_corrected_model_is_diagnosed_with_its_effects(of_ridge):
     left = np.sqrt(np.mean((corrected.predict(LOG.X) - LOG.y) ** 2, axis=0))
     assert np.all(again.rmse_before < 1.5 * left)
     assert [t.kind for t in again.add("spring", [1]).effect_terms_] == ["spring", "spring"]
+
+
+def test_open_shapes_are_found_and_effects_without_their_signals_refused(of_ridge):
+    (term,) = of_ridge.add("dahl", [1]).effect_terms_
+    assert term.shape["presliding"] > 0
+    with pytest.raises(EffectError, match="needs its shape parameter N"):
+        of_ridge.add("torque_ripple", [1])
+    with pytest.raises(EffectError, match="needs joint temperatures"):
+        of_ridge.add("temperature_offset")
 
 
 def test_the_search_is_one_of_scikit_learn():

@@ -67,7 +67,7 @@ def test_catalogue_is_complete():
         ("dahll", "no effect"),
         (("dahl", [3]), "no joint 3"),
         (("dahl", [0]), "no joint 0"),
-        (("coupled_friction", [1]), "couples two joints"),
+        (("coupled_friction", [1]), r"couples two joints; name both: skidyn add --joints 1,2"),
     ],
 )
 def test_terms_that_cannot_be(spec, words):
