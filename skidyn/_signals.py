@@ -414,6 +414,8 @@ def read_signals(
                 "X has no time column; name it by time=..., or give the sampling rate by rate=..."
             )
         signals = signals.with_(time=np.arange(len(values)) / rate)
+    elif columns.time is not None:
+        refuse_equal_times(signals, named(columns.time, names))
     for name, block in (("q", signals.q), ("dq", signals.dq), ("tau", torque)):
         bad = ~np.isfinite(block)
         if bad.any():
@@ -423,6 +425,37 @@ def read_signals(
                 f"{row} ({int(bad.any(1).sum())} such rows); drop or repair them first"
             )
     return signals, torque
+
+
+def named(column: int, names: Sequence[str] | None) -> str:
+    """A column of X in a message, by its name or its number.
+
+    >>> named(1, ["trajectory", "time"]), named(1, None)
+    ("'time'", '1')
+    """
+    return str(column) if names is None else repr(str(names[column]))
+
+
+def refuse_equal_times(signals: Signals, column: str) -> None:
+    """Refuse a clock that stands still in a trajectory, or in most steps of all trajectories."""
+    if signals.time is None or signals.n_samples == 0:
+        return
+    ends = np.flatnonzero(~signals.within) + 1
+    names, still = signals.trajectory[np.r_[0, ends]], []
+    told = ""
+    for name, times in zip(names, np.split(signals.time, ends), strict=True):
+        if len(times) > 2:
+            still.append(float(np.mean(np.diff(times) == 0)))
+            if still[-1] == 1:
+                told = f"is {times[0]:.9g} in all {len(times)} rows of trajectory {name:g}"
+    if still and not told and min(still) > 0.5:
+        told = f"repeats its value of the row before in at least {min(still):.0%} of the rows"
+    if told:
+        raise ColumnError(
+            f"the column {column} of X, the time in s, {told}; leave out repeated rows and give "
+            "times that advance, in float64, since float32 cannot hold seconds since 1970 unless "
+            "the start is subtracted"
+        )
 
 
 def refuse_other_order(torque: Any, robot: Robot) -> None:

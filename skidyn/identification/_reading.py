@@ -18,7 +18,9 @@ from skidyn._order import has_one_motion, order_in_time
 from skidyn._signals import (
     Array,
     Signals,
+    named,
     rates_of,
+    refuse_equal_times,
     refuse_other_gravity,
     refuse_other_order,
     signals_from,
@@ -68,6 +70,9 @@ class Reading:
             if not has_one_motion(signals.trajectory, signals.time):
                 # Recordings that cannot be separated: no row has a neighbour.
                 signals = self._without_clock(signals)
+        if self.columns_.time is not None:
+            names = getattr(self, "feature_names_in_", None)
+            refuse_equal_times(signals, named(self.columns_.time, names))
         if not first and named_recordings(self.effect_terms_):
             signals = recognise(signals, self.recordings_)
         notes = broken_notes(signals, torque, self.robot_.joint_names)
@@ -82,7 +87,7 @@ class Reading:
         alone = len(numbers) > 2 and len(np.unique(numbers)) == len(numbers)
         if fractions or alone:
             names = getattr(self, "feature_names_in_", None)
-            which = column if names is None else repr(str(names[column]))
+            which = named(column, names)
             holds = "numbers that are not whole" if fractions else "another number in every row"
             warn_about_log(
                 f"the column {which} of X, which is declared as that of the trajectories, holds "

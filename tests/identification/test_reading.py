@@ -15,6 +15,7 @@ from sklearn.model_selection import (
 )
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
 from skidyn.exceptions import ColumnError, LogWarning
 from skidyn.identification import RBDRegressor
 from skidyn.model_selection import LeakageWarning, TrajectoryKFold
@@ -146,3 +147,20 @@ def test_few_rows_bring_no_bare_warnings_of_numpy():
         warnings.simplefilter("error", RuntimeWarning)
         with pytest.warns(LogWarning, match="5 samples make"):
             RBDRegressor(ROBOT).fit(FULL[:5], LOG.y[:5])
+
+
+@pytest.mark.parametrize(
+    ("time", "told"),
+    [
+        (np.zeros(len(FULL)), "'time' of X, the time in s, is 0 in all"),
+        (np.float32(FULL["time"] + 1.7e9), "float32 cannot hold seconds since 1970"),
+        (np.float32(FULL["time"] + 1e6), "repeats its value of the row before"),
+    ],
+    ids=["constant", "since 1970", "coarse"],
+)
+def test_times_that_do_not_advance_are_refused(time, told):
+    X = FULL.assign(time=time)
+    with pytest.raises(ColumnError, match=told):
+        RBDRegressor(ROBOT).fit(X, LOG.y)
+    with pytest.raises(ColumnError, match=told):
+        diagnose(RBDRegressor(ROBOT), X, LOG.y)
