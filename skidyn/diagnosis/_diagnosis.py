@@ -21,6 +21,7 @@ from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning, S
 from skidyn._memory import give_back
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
+from skidyn._text import counted
 from skidyn.diagnosis._beginnings import look_after_beginnings
 from skidyn.diagnosis._blocks import block_length, time_blocks, variance_inflation
 from skidyn.diagnosis._conclusion import conclude
@@ -377,7 +378,7 @@ def _checked_and_searched(
     with aside(log.checks) as told:
         try:
             problem = log.problem()
-            _check_rows(problem)
+            _check_rows(problem, getattr(log.asked.X, "attrs", {}).get("files", ()))
             if not log.torque.any():  # with force: otherwise the checks refuse it
                 raise LogError(
                     "every torque is zero, so that no effect has a size: the torque was not "
@@ -477,13 +478,27 @@ def _whiteness(problem: Problem, fit: Fit) -> Array:
     return ratio
 
 
-def _check_rows(problem: Problem) -> None:
-    empty = [j + 1 for j, n in enumerate(problem.rows.counts) if n < 8]
-    if len(empty) == problem.n_joints:
-        raise LogError(
-            "no joint moves long enough for a diagnosis: the log is too short, scattered in "
-            "time, or all joints are at rest"
-        )
+#: Averaging windows of one joint at least.
+FEWEST_WINDOWS = 8
+
+
+def _check_rows(problem: Problem, files: Sequence[str] = ()) -> None:
+    """Refuse a log, of some files, in which no joint moves long enough."""
+    counts = problem.rows.counts
+    if max(counts) >= FEWEST_WINDOWS:
+        return
+    names = list(dict.fromkeys(files))
+    source = f"{names[0]}: " if len(names) == 1 else ""
+    signals = problem.signals
+    steps = zip(signals.segments, signals.steps, strict=True)
+    length = sum(step * (rows.stop - rows.start - 1) for rows, step in steps)
+    raise LogError(
+        f"{source}no joint moves long enough for a diagnosis: of the {length:.3g} s in "
+        f"{counted(len(np.unique(signals.trajectory)), 'trajectory')}, at most "
+        f"{counted(int(max(counts)), 'averaging window')} away from rest and reversals are left "
+        f"for a joint, and {FEWEST_WINDOWS} are needed. Record at least 10 s in which every joint "
+        "moves, better several trajectories, or pass further recordings"
+    )
 
 
 def _residual_problem(

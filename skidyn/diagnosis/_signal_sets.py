@@ -218,7 +218,7 @@ def _hats(x: Array, count: int) -> Array:
     hats = [np.interp(x, knots, hat) for hat in np.eye(len(knots))]
     left, size, _ = np.linalg.svd(np.column_stack(hats), full_matrices=False)
     columns = np.zeros((len(x), count))
-    columns[:, : len(knots)] = left * np.sqrt(len(x)) * (size > RESOLVED * size[0])
+    columns[:, : len(size)] = left * np.sqrt(len(x)) * (size > RESOLVED * size[0])
     return columns
 
 

@@ -275,6 +275,14 @@ def test_a_robot_that_rests_is_refused_by_a_sentence():
         diagnose(RBDRegressor(log.robot), X, y)
 
 
+def test_a_short_log_is_refused_with_its_file_and_what_it_lacks():
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=1, duration=0.5)
+    X = log.X.copy()
+    X.attrs["files"] = ["short.csv"]
+    with pytest.raises(LogError, match=r"^short.csv: no joint.*0.49 s in 1 traj.*8 are needed"):
+        diagnose(RBDRegressor(log.robot), X, log.y)
+
+
 @pytest.mark.parametrize("model", [None, pd.DataFrame({"q1": [0.0]})])
 def test_a_model_that_is_none_is_refused_with_the_order_of_arguments(model):
     with pytest.raises(ValueError, match=r"expected a regressor: diagnose\(model, X, tau\)"):

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from skidyn.exceptions import LogError, LogWarning
-from skidyn.logs import read_log
+from skidyn.logs import check_log, read_log
 
 
 @pytest.fixture
@@ -204,6 +204,25 @@ def test_a_new_recording_is_no_jitter(read, jittering):
     half = pd.concat([jittering[200:400], jittering[300:500]])
     with pytest.raises(LogError, match="If a new recording begins there"):
         read(half, clock="regular")
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_shuffled_rows_are_no_jitter(read, jittering, own):
+    rows = jittering.assign(trajectory=np.arange(500) // 250) if own else jittering
+    with pytest.raises(LogError, match="if the rows are out of order, sort them by time") as error:
+        read(rows.sample(frac=1.0, random_state=0))
+    assert "jitter" not in str(error.value)
+
+
+def test_a_log_that_repeats_its_trajectories_is_refused(read):
+    t = np.arange(200) * 0.01
+    log = pd.DataFrame({"time": t, "trajectory": np.arange(200) // 100, "q1": np.sin(t)})
+    with pytest.raises(LogError, match=r"trajectory 0 occurs again from row 200 on.*0 s after 0.9"):
+        read(pd.concat([log, log]))
+    with pytest.raises(LogError, match="trajectory 0 occurs again"):
+        check_log(pd.concat([log, log]).assign(dq1=1.0, tau1=1.0))
+    later = log.assign(time=t + 2.0)  # the second part of each trajectory
+    assert len(read(pd.concat([log, later]))[0]) == 400
 
 
 def test_recordings_that_alternate(read):
