@@ -66,6 +66,9 @@ class Effect:
     leading : int
         With ``search="trajectories"``: number of first coefficients that every single trajectory
         determines; all of them if 0.
+    is_body : bool
+        With ``search="trajectories"``: whether the identified bodies take it in if it is there in
+        all trajectories.
     places : tuple of str
         With ``search="trajectories"``: entries of the shape for other places than the usual one
         (:meth:`elsewhere`).
@@ -145,6 +148,7 @@ class Effect:
     needs: ClassVar[tuple[str, ...]] = ()
     automatic: ClassVar[bool] = True
     leading: ClassVar[int] = 0
+    is_body: ClassVar[bool] = False
     places: ClassVar[tuple[str, ...]] = ()
     elsewhere_must_gain: ClassVar[float] = 1.0
     grows: ClassVar[bool] = False
