@@ -109,7 +109,9 @@ class Candidate:
         bool
         """
         term = self.term
-        return self.allows(coefficients) and term.effect.can_have(coefficients, term.shape, signals)
+        return self.allows(coefficients) and term.effect.can_have(
+            coefficients, term.shape, signals, term.places
+        )
 
     @cached_property
     def joints(self) -> tuple[int, ...]:

@@ -267,7 +267,13 @@ class Effect:
         """
         return self.coefficients
 
-    def can_have(self, coefficients: Array, shape: Mapping[str, Any], signals: Signals) -> bool:
+    def can_have(
+        self,
+        coefficients: Array,
+        shape: Mapping[str, Any],
+        signals: Signals,
+        joints: Sequence[int],
+    ) -> bool:
         """Whether coefficients are those of this effect, and not of another one.
 
         Parameters
@@ -278,6 +284,8 @@ class Effect:
             Shape parameters.
         signals : Signals
             Motion and robot.
+        joints : sequence of int
+            Places of the term's joints in arrays.
 
         Returns
         -------
@@ -600,6 +608,21 @@ class Effect:
         for turning, sliding in (("kg m^2", "kg"), ("N m", "N"), ("rad", "m")):
             units = {name: unit.replace(turning, sliding) for name, unit in units.items()}
         return units
+
+    def formula_of(self, shape: Mapping[str, Any]) -> str:
+        """The formula that a shape selects, in LaTeX.
+
+        Parameters
+        ----------
+        shape : mapping
+            Shape parameters.
+
+        Returns
+        -------
+        str
+            :attr:`formula` by default, which has all forms.
+        """
+        return self.formula
 
     def describe(self) -> dict[str, Any]:
         """All information printed in the catalogue, the report and the documentation.
