@@ -27,7 +27,6 @@ from skidyn.diagnosis._remainder import position_noise, position_noises
 from skidyn.diagnosis._rule import SLOW_MOTION
 from skidyn.evidence import Fit, Problem, make_problem, smooth_motion
 
-
 #: What keeps a ratio to a noise of zero finite, N m or N.
 TINY = 1e-300
 

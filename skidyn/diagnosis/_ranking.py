@@ -507,11 +507,9 @@ class RankingSearch(LineSearch):
             hypothesis = replace(hypothesis, candidates=tuple(candidates))
         else:
             after = self._errors(hypothesis, within)
-        beside = [[o for o in candidates if o is not c] for c in candidates]
-        if not all(
-            self.can_be(c, [*self.chosen, *rest]) for c, rest in zip(candidates, beside, strict=True)
-        ):
-            return None
+        for c in candidates:
+            if not self.can_be(c, [*self.chosen, *(o for o in candidates if o is not c)]):
+                return None
         gain = log_likelihood_gain(self.errors_now(within), after, self.problem.rows.counts)
         count = self._n_parameters(candidates)
         price = 2 * self._price(candidates)
