@@ -11,9 +11,10 @@ base parameters with the effects eliminated, and ``C`` the covariance of the bas
 relative changes of all bodies by 1, they are the eigenvectors of ``S`` with respect to ``C^-1``.
 For an eigenvalue ``l`` the relative standard error of the data is ``1/sqrt(l)``. The relative error
 of the URDF, ``t``, and the excess of the rows' scatter over white noise, ``f``, maximise the
-likelihood of the least-squares coordinates ``z ~ N(0, t^2 + f / l)`` times weak priors (empirical
-Bayes); in a direction whose coordinate is much larger, ``t`` is that of this direction. With
-``x = l t^2 / f`` a direction keeps the share ``x^3 / (1 + x^3)`` of its distance from
+likelihood of the least-squares coordinates ``z``, of variance ``t^2 + f / l`` and Student's law,
+times weak priors (empirical Bayes): an effect that the model lacks, such as a counterweight, moves
+a few of them far. Where left-out folds contradict their ratio, a larger one is used.
+With ``x = l t^2 / f`` a direction keeps the share ``x^3 / (1 + x^3)`` of its distance from
 the URDF. With the third power the transition is sharp: a direction that the data determines ten
 times better than the URDF changes by one part in a million.
 
@@ -56,10 +57,12 @@ RESOLVED = 1e-8
 USUAL, FACTOR = (0.3, 1.0), (3.0, 10.0)
 #: Degrees of freedom of Student's law of the coordinates, of which few are far from the others.
 TAIL = 2.0
-#: Multiple of its variance that the square of a coordinate must exceed to show an error of its own.
-CHANCE = 9.0
-#: Factor between the excesses that are tried on left-out folds.
-EXCESS_STEP = 4.0
+#: Factor between the ratios that are tried on left-out folds, and the largest one: that of bodies
+#: which may be anything, and rows whose scatter is white noise.
+RATIO_STEP, MOST_RATIO = 4.0, 1.0
+#: Share of the rows, in units of their noise, by which the error of left-out folds must be larger
+#: for directions to be released that most likely are weak.
+MATERIAL = 0.05
 #: Largest pull on a direction relative to its information; keeps the left-out sums finite.
 MOST_PULL = 1e12
 
@@ -92,7 +95,7 @@ def keep_weak_directions(
 
     z = found.into @ coefficients[:n]
     spread, excess = _spreads(z, values)
-    share = _supported(found, z, spread, excess, grams, cross)
+    share = _supported(found, spread**2 / excess, grams, cross, float(whole.counts.sum()))
     if whole.instruments is not None or not trusted:
         # Instruments remove a bias that the information does not contain: only open directions are
         # kept.
@@ -154,18 +157,19 @@ class _Directions:
 
 
 def _supported(
-    found: _Directions, z: Array, spread: float, excess: float, grams: Array, cross: Array
+    found: _Directions, likely: float, grams: Array, cross: Array, n_rows: float
 ) -> Array:
     """Share of its distance from the URDF that every direction keeps.
 
-    With the largest excess, from the most likely one down to that of white noise, whose error of
-    left-out folds is that of the best one to within its standard error (L. Breiman et al. 1984,
-    Classification and Regression Trees, chapter 3.4.3).
+    With the least ratio ``t^2 / f``, from the most likely one up to :data:`MOST_RATIO`, whose error
+    of left-out folds is that of the best one to within its standard error (L. Breiman et al. 1984,
+    Classification and Regression Trees, chapter 3.4.3) or :data:`MATERIAL`. Folds that are alike do
+    not show what another motion would, so that a small gain is no reason to trust weak directions.
     """
-    tried = [excess]
-    while tried[-1] > 1.0 and len(grams) > 1:
-        tried.append(max(1.0, tried[-1] / EXCESS_STEP))
-    shares = [_shares(z, found.values, spread, one) for one in tried]
+    tried = [likely]
+    while tried[-1] < MOST_RATIO and len(grams) > 1:
+        tried.append(min(MOST_RATIO, tried[-1] * RATIO_STEP))
+    shares = [_shares(found.values, ratio) for ratio in tried]
     errors = []
     for share in shares:
         left = _pulled(found, share, grams, cross)
@@ -173,10 +177,11 @@ def _supported(
             np.einsum("ki,kij,kj->k", left, grams, left) - 2 * np.sum(left * cross, axis=1)
         )
     behind = [error - min(errors, key=np.sum) for error in errors]
+    small = MATERIAL * n_rows
     return next(
         share
         for share, own in zip(shares, behind, strict=True)
-        if len(own) < 2 or own.sum() <= own.std(ddof=1) * np.sqrt(len(own))
+        if len(own) < 2 or own.sum() <= max(small, own.std(ddof=1) * np.sqrt(len(own)))
     )
 
 
@@ -203,16 +208,9 @@ def prior_root(robot: Robot) -> Array:
     return np.asarray(size[:, None] * root)
 
 
-def _shares(z: Array, values: Array, spread: float, excess: float) -> Array:
-    """Share of its distance from the URDF that every direction keeps, for one excess.
-
-    The square of the URDF's relative error is that of all directions, or what a coordinate shows
-    beyond :data:`CHANCE` times its own variance: an effect that the model lacks, such as a
-    counterweight or a spring, moves a few directions far from a URDF that is right in the others.
-    """
-    variance = excess / np.where(values > 0, values, np.inf)
-    own = np.where(values > 0, z**2 - CHANCE * variance, 0.0)
-    known = values * np.maximum(spread**2, own) / excess
+def _shares(values: Array, ratio: float) -> Array:
+    """Share of its distance from the URDF that every direction keeps, for a ratio t^2 / f."""
+    known = values * ratio
     return np.asarray(known**POWER / (1 + known**POWER))
 
 
