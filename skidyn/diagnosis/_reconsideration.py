@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -213,20 +214,35 @@ class ReconsideringSearch(DuellingSearch):
         return None
 
     def _second_name(self, first: Hypothesis, function: Hypothesis) -> Hypothesis | None:
-        """A known effect that together with a first one is as good as a function."""
+        """A known effect that together with a first one is as good as a function.
+
+        If it is not as it stands, the shape of the first one, which was fitted to both, is searched
+        again beside it.
+        """
         left, removed = self.left_and_removed(function)
+        as_good = partial(self._good_enough, least=left, removed=removed, joints=function.joints)
         kept = self._state()
         self.add(first)
         self.refit()
         self.sigma = self.weights()
-        found = [h for h in self._known_alone() if set(function.joints) <= set(h.joints)]
+        beside = self._state()
+        second = None
+        for h in self._known_alone():
+            if not set(function.joints) <= set(h.joints) or h.errors is None:
+                continue
+            if as_good(h.errors.sum(0)) or as_good(self._left_once_settled(first, h)):
+                second = h
+                break
+            self._restore(beside)
         self._restore(kept)
-        for h in found:
-            if h.errors is not None and self._good_enough(
-                h.errors.sum(0), left, removed, function.joints
-            ):
-                return h
-        return None
+        return second
+
+    def _left_once_settled(self, first: Hypothesis, second: Hypothesis) -> Array:
+        """Held-out error with a second effect and the shape of the first searched beside it."""
+        self.add(second)
+        self.refit()
+        self._settled(first)
+        return self._left()
 
     def _hidden_names(self, function: Hypothesis, tried: Collection[str]) -> list[Hypothesis]:
         """Known effects on the joint of a function of several signals, significant or not.

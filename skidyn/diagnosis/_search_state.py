@@ -152,6 +152,7 @@ class SearchState:
     def _restore(self, kept: Kept) -> None:
         for name, value in kept._asdict().items():
             setattr(self, name, value)
+        self.findings = list(kept.findings)  # it may be restored again
         self.refit()
 
     def add(self, best: Hypothesis) -> None:
