@@ -413,7 +413,7 @@ class Fits:
             places[at] = np.append(places[at], new)
             return Outcome.of(self.n_joints, joints, fit_together(designs, places, targets))
 
-        return self._of_torque.get(("spring", joint), Reading(), outcome)
+        return self._of_torque.get("spring", joint, outcome, self.n_joints)
 
     def predicted_without(
         self, parts: Iterable[NDArray[np.bool_]]

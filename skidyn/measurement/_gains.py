@@ -182,7 +182,7 @@ def spring_gain(fits: Fits, k: int) -> float:
     there, here = fits.with_a_spring(k), fits.identified(Reading())
     numbers = len(there.fits[k].coefficients) - len(here.fits[k].coefficients)
     rows = float(fits.moving[:, k].sum()) / there.inflation_of(k)
-    return there.gained_over(here) - 0.5 * numbers * np.log(max(rows, 2.0))
+    return float(there.gained_over(here) - 0.5 * numbers * np.log(max(rows, 2.0)))
 
 
 def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float]:
