@@ -109,9 +109,7 @@ class Candidate:
         bool
         """
         term = self.term
-        return self.allows(coefficients) and term.effect.can_have(
-            coefficients, term.shape, signals, term.places
-        )
+        return self.allows(coefficients) and term.effect.can_have(coefficients, term.shape, signals)
 
     @cached_property
     def joints(self) -> tuple[int, ...]:

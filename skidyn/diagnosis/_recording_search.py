@@ -7,10 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+from scipy.linalg import null_space
+
 from skidyn.diagnosis._candidates import Candidate, rows_together
 from skidyn.diagnosis._hypothesis import UNKNOWN, grouped_by_joints, some_recordings
 from skidyn.diagnosis._recordings import DRIFT, FRICTION, choose, drifting, every_recording
-from skidyn.diagnosis._rule import ALL_LEFT
+from skidyn.diagnosis._rule import ALL_LEFT, CLEARLY_NEGATIVE
 from skidyn.diagnosis._search_state import SearchState
 
 
@@ -38,8 +41,18 @@ class RecordingSearch(SearchState):
 
     def can_be(self, candidate: Candidate, others: Sequence[Candidate]) -> bool:
         """Whether a candidate's coefficients, together with others, are physically possible."""
-        size = self.tester(others).test(candidate.rows).coefficients
-        return candidate.can_have(size, self.problem.few)
+        tester, few, term = self.tester(others), self.problem.few, candidate.term
+        size = tester.test(candidate.rows).coefficients
+        if not candidate.can_have(size, few):
+            return False
+        weights = term.effect.positive(few, term.places, term.shape)
+        if weights is None or weights @ size >= 0:
+            return True
+        # What is lost where the sum is zero shows whether it is determined.
+        zero = null_space(weights[None] / np.linalg.norm(weights))
+        bound = {j: block @ zero for j, block in candidate.rows.items()}
+        lost = tester.estimate(candidate.rows)[1] - tester.estimate(bound)[1]
+        return bool(lost < CLEARLY_NEGATIVE * self._price([candidate]))
 
     def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
         """Effects of few recordings as known effects, those of many recordings as unknown.

@@ -267,13 +267,7 @@ class Effect:
         """
         return self.coefficients
 
-    def can_have(
-        self,
-        coefficients: Array,
-        shape: Mapping[str, Any],
-        signals: Signals,
-        joints: Sequence[int],
-    ) -> bool:
+    def can_have(self, coefficients: Array, shape: Mapping[str, Any], signals: Signals) -> bool:
         """Whether coefficients are those of this effect, and not of another one.
 
         Parameters
@@ -284,8 +278,6 @@ class Effect:
             Shape parameters.
         signals : Signals
             Motion and robot.
-        joints : sequence of int
-            Places of the term's joints in arrays.
 
         Returns
         -------
@@ -293,6 +285,27 @@ class Effect:
             True by default.
         """
         return True
+
+    def positive(
+        self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]
+    ) -> Array | None:
+        """Weights of the coefficients in a sum that must not be clearly negative.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+        joints : sequence of int
+            Places of the term's joints in arrays.
+        shape : mapping
+            Shape parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_coefficients,) or None
+            None by default.
+        """
+        return None
 
     def usually(
         self,

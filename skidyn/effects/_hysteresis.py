@@ -358,13 +358,7 @@ class MaxwellSlip(PathMemory):
     separating_motion = "small reversals inside the pre-sliding range, of several amplitudes"
     reference = "Al-Bender, Lampaert, Swevers (2005), IEEE TAC 50(11), 1883-1887."
 
-    def can_have(
-        self,
-        coefficients: Array,
-        shape: Mapping[str, Any],
-        signals: Signals,
-        joints: Sequence[int],
-    ) -> bool:
+    def can_have(self, coefficients: Array, shape: Mapping[str, Any], signals: Signals) -> bool:
         # Once all elements slip, they resist the motion.
         return bool(np.sum(coefficients) > 0)
 

@@ -163,17 +163,12 @@ class NonlinearSpring(Effect):
         wide = shape["high"] - shape["low"] > NARROW * (q.max() - q.min())
         return bool(wide) and min(least) > FEWEST_TOUCHING
 
-    def can_have(
-        self,
-        coefficients: Array,
-        shape: Mapping[str, Any],
-        signals: Signals,
-        joints: Sequence[int],
-    ) -> bool:
+    def positive(
+        self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]
+    ) -> Array | None:
         # A spring pushes back over its travel as a whole; one that does not is a counterweight.
         q = signals.q[:, joints[0]]
-        torque = self.columns(signals, joints[0], **shape) @ coefficients
-        return bool((q - q.mean()) @ torque >= 0)
+        return np.asarray((q - q.mean()) @ self.columns(signals, joints[0], **shape))
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
         return (*self.pieces, self.coefficients[-1]) if "low" in shape else self.coefficients

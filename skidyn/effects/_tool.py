@@ -248,13 +248,7 @@ class ExternalWrench(_ToolEffect):
         products = [Coefficient(f"{a}f{b}", "N m") for a in "xyz" for b in "xyz"]
         return (*self.coefficients[:3], *products)
 
-    def can_have(
-        self,
-        coefficients: Array,
-        shape: Mapping[str, Any],
-        signals: Signals,
-        joints: Sequence[int],
-    ) -> bool:
+    def can_have(self, coefficients: Array, shape: Mapping[str, Any], signals: Signals) -> bool:
         # A weight on a point that turns with the tool is a payload.
         return "arm" not in shape or not _is_vertical(coefficients[:3], signals)
 

@@ -57,8 +57,8 @@ def test_dahl_with_another_exponent_by_small_steps(signals, columns_of, exponent
 
 def test_maxwell_elements_resist_the_motion_once_all_of_them_slip(signals):
     effect, shape = get_effect("maxwell_slip"), {"presliding": 0.02}
-    assert effect.can_have(np.array([0.1, -0.02, 0.3]), shape, signals, (0,))
-    assert not effect.can_have(np.array([0.1, -0.2, -0.1]), shape, signals, (0,))
+    assert effect.can_have(np.array([0.1, -0.02, 0.3]), shape, signals)
+    assert not effect.can_have(np.array([0.1, -0.2, -0.1]), shape, signals)
 
 
 def test_maxwell_elements_of_a_wider_spread_slip_later(signals):

@@ -220,7 +220,7 @@ def test_a_weight_on_a_point_that_turns_with_the_tool_is_a_payload_and_no_force(
 
     def can_be(force, **shape):
         coefficients = np.concatenate([force, np.outer(AT, force).ravel()])
-        return effect.can_have(coefficients, shape, signals, range(signals.n_joints))
+        return effect.can_have(coefficients, shape, signals)
 
     assert not can_be([0.1, 0.0, -4.0], arm=1.0)
     assert can_be([2.0, 0.0, -4.0], arm=1.0)
