@@ -10,11 +10,13 @@ from functools import partial
 import numpy as np
 from scipy.linalg import null_space
 
+from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, rows_together
 from skidyn.diagnosis._hypothesis import UNKNOWN, grouped_by_joints, some_recordings
 from skidyn.diagnosis._recordings import DRIFT, FRICTION, choose, drifting, every_recording
-from skidyn.diagnosis._rule import ALL_LEFT, CLEARLY_NEGATIVE
+from skidyn.diagnosis._rule import ALL_LEFT, SURE_SIGN
 from skidyn.diagnosis._search_state import SearchState
+from skidyn.diagnosis._tester import Tester
 
 
 class RecordingSearch(SearchState):
@@ -46,13 +48,25 @@ class RecordingSearch(SearchState):
         if not candidate.can_have(size, few):
             return False
         weights = term.effect.positive(few, term.places, term.shape)
-        if weights is None or weights @ size >= 0:
-            return True
-        # What is lost where the sum is zero shows whether it is determined.
+        return weights is None or not (
+            weights @ size < 0 and self._is_sure(weights, candidate, tester)
+        )
+
+    def _is_sure(self, weights: Array, candidate: Candidate, tester: Tester) -> bool:
+        """Whether a sum of a candidate's coefficients is not zero, by what is lost where it is.
+
+        In units of the noise that is left with the candidate: most of that without it may be the
+        torque of the candidate.
+        """
         zero = null_space(weights[None] / np.linalg.norm(weights))
         bound = {j: block @ zero for j, block in candidate.rows.items()}
-        lost = tester.estimate(candidate.rows)[1] - tester.estimate(bound)[1]
-        return bool(lost < CLEARLY_NEGATIVE * self._price([candidate]))
+        removed = tester.estimate(candidate.rows)[1]
+        lost = removed - tester.estimate(bound)[1]
+        reached = list(candidate.rows)
+        error = float(np.sum(self.left[reached] / self.sigma[reached] ** 2))
+        error -= 0.0 if candidate in self.chosen else min(removed, error)
+        noise = min(1.0, error / max(1.0, float(self._counts[reached].sum())))
+        return bool(lost >= SURE_SIGN * noise * self._price([candidate]))
 
     def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
         """Effects of few recordings as known effects, those of many recordings as unknown.
