@@ -35,6 +35,10 @@ from skidyn.diagnosis._split import recordings_with
 from skidyn.effects import Term, get_effect
 
 
+#: Effects with another size in most recordings that are one of all of them, which changes.
+PLAIN = (*FRICTION, "offset")
+
+
 class ReconsideringSearch(DuellingSearch):
     """A search that judges findings together."""
 
@@ -118,14 +122,14 @@ class ReconsideringSearch(DuellingSearch):
         return max(judged, key=lambda h: h.score, default=None)
 
     def _plain_first(self, best: Hypothesis) -> tuple[Hypothesis, Sequence[Candidate]]:
-        """Friction that the model lacks and that changes, instead of sizes for most recordings.
+        """Friction or an offset that changes, instead of sizes for most recordings.
 
-        With the terms of the change, beside which the plain friction has to be significant: with
+        With the terms of the change, beside which the plain effect has to be significant: with
         one size in all recordings, it leaves more than it removes in some of them.
         """
         names, own = self.problem.rows.recordings, grouped_by_joints(best.candidates)
         shares = [recordings_with(best.kind, some, names).mean() for some in own]
-        if best.kind not in FRICTION or min(map(len, own)) < 2 or min(shares) <= IN_MOST:
+        if best.kind not in PLAIN or min(map(len, own)) < 2 or min(shares) <= IN_MOST:
             return best, ()
         joints = {some[0].joints for some in own}
         plain = [c for c in self.pool if c.kind == best.kind and c.joints in joints]
