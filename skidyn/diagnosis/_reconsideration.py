@@ -34,7 +34,6 @@ from skidyn.diagnosis._search_state import still_free
 from skidyn.diagnosis._split import recordings_with
 from skidyn.effects import Term, get_effect
 
-
 #: Effects with another size in most recordings that are one of all of them, which changes.
 PLAIN = (*FRICTION, "offset")
 
