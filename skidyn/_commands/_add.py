@@ -27,6 +27,9 @@ from skidyn._writing import write_json
 if TYPE_CHECKING:
     from skidyn.effects import Term
 
+#: Growth of a held-out error from which a joint is marked as worse.
+WORSE = 0.02
+
 DESCRIPTION = """\
 Add an effect to a model that skidyn diagnose has judged, and print the held-out error before and
 after. The report records the files of the log and the model, and the recordings and times of
@@ -117,6 +120,9 @@ def run(options: argparse.Namespace) -> None:
         terms = limited_terms(options.report, kind, joints, robot.n_joints) or make_terms(
             [kind if joints is None else (kind, joints)], robot.n_joints
         )
+        had = {(t.kind, t.joints) for t in make_terms(model.effects, robot.n_joints)}
+        if not any(t.when for t in terms) and {(t.kind, t.joints) for t in terms} <= had:
+            raise SkidynError(f"the model has {kind} on these joints already")
         fitted = model.with_effects(terms).fit(frame, tau)
         better = model.with_effects(fitted.effect_terms_[-len(terms) :])
     after = run_diagnosis(better, frame, tau, options, kinds=(), checks=given.checks).rmse_before
@@ -132,6 +138,9 @@ def run(options: argparse.Namespace) -> None:
         change = round(after[j] / before[j] - 1, 2) if before[j] > 0 else 0.0
         unit = "N" if robot.joint_types[j] == "prismatic" else "N m"
         told = f"{digits(before[j]):>9s} -> {digits(after[j]):>9s} {unit}"
-        print(f"  {j + 1} {name:24s} {told}  ({change + 0.0:+.0%})")
+        mark = "  worse" if change >= WORSE else ""
+        print(f"  {j + 1} {name:24s} {told}  ({change + 0.0:+.0%}){mark}")
+    if options.out:
+        print(f"written: {options.out}")
     if stated is not None:
         print(f"next: the same with --controller {shlex.quote(stated)}")

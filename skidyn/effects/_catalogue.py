@@ -159,7 +159,10 @@ def _expand(kind: str, joints: Sequence[int] | None, n_joints: int) -> list[Term
     if scope == "joint":
         return [Term.at(kind, (j,)) for j in chosen]
     if scope == "pair" and len(chosen) != 2:
-        raise EffectError(f"{kind} couples two joints; write ({kind!r}, [5, 6])")
+        raise EffectError(
+            f"{kind} couples two joints: state both, such as --joints 1,2 (in Python: "
+            f"({kind!r}, [1, 2]))"
+        )
     return [Term.at(kind, chosen)]
 
 

@@ -68,6 +68,7 @@ class Reading:
             if not has_one_motion(signals.trajectory, signals.time):
                 # Recordings that cannot be separated: no row has a neighbour.
                 signals = self._without_clock(signals)
+        self._refuse_a_clock_that_stands(signals)
         if not first and named_recordings(self.effect_terms_):
             signals = recognise(signals, self.recordings_)
         notes = broken_notes(signals, torque, self.robot_.joint_names)
@@ -75,6 +76,19 @@ class Reading:
         for what, where in notes:
             warn_about_log(f"{what}: {where}.")  # as the checks say it
         return signals, torque, order
+
+    @staticmethod
+    def _refuse_a_clock_that_stands(signals: Signals) -> None:
+        """Refuse times of which most are those of the row before."""
+        if signals.time is None or not signals.within.any():
+            return
+        steps = np.diff(signals.time)[signals.within]
+        if np.median(steps) == 0:
+            raise ColumnError(
+                "most times of X are equal to those of the row before, so that the log has no "
+                "rate: give times in s as float64 (float32 cannot hold seconds since 1970), from "
+                "the start of the log, or time=None"
+            )
 
     def _doubt_trajectories(self, numbers: NDArray[Any], column: int) -> None:
         """Warn if the column of trajectories looks like another signal."""
