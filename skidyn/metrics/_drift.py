@@ -124,12 +124,12 @@ def drift(
     if folds is None:
         try:
             folds = list(TrajectoryKFold(n_splits=4).split(X_reference, known))
-        except ValueError as error:
+        except ValueError as few:
             raise SkidynError(
                 f"the reference cannot be cut into the four folds of whole trajectories that are "
-                f"held out by default ({error}); give folds=, a list of pairs of training and test "
+                f"held out by default ({few}); give folds=, a list of pairs of training and test "
                 "rows"
-            ) from error
+            ) from few
     told = np.full(known.shape, np.nan)
     for train, test in folds:
         fitted = clone(model).fit(_rows(X_reference, train), known[train])

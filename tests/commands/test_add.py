@@ -138,3 +138,16 @@ def test_a_damaged_setting_is_refused(weak_servo, capsys):
     words = ["add", "--from", str(weak_servo / "damaged.json"), "--effect", "servo_current"]
     assert cli.main(words) == cli.BAD_INPUT
     assert "it must come from skidyn diagnose" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("viscous",), "has viscous on these joints already"),
+        (("torque_ripple", "--joints", "2"), "shape parameter N"),
+        (("coupling_spring", "--joints", "1"), "--joints 1,2"),
+    ],
+)
+def test_what_cannot_be_added_is_told_in_a_line(diagnosed, capsys, words, told):
+    assert cli.main(["add", "--from", str(diagnosed / "report.json"), "--effect", *words]) == 2
+    assert told in capsys.readouterr().err
