@@ -216,7 +216,26 @@ def stamps_jitter(time: np.ndarray, trajectory: np.ndarray) -> bool:
         return False
     # a restart after a few rows is a new recording, unless there are many steps forward
     least = min(FEW_STEPS, len(forward) / 2)
-    return bool(steps.min() > -least * np.median(forward))
+    order = np.lexsort((time, trajectory))
+    sorted_steps = np.diff(time[order])[np.diff(trajectory[order]) == 0]
+    usual = np.median(sorted_steps[sorted_steps > 0])  # steps between shuffled rows are long
+    return bool(steps.min() > -least * usual)
+
+
+def _refuse_trajectories_that_come_again(
+    time: np.ndarray, trajectory: np.ndarray, source: str
+) -> None:
+    """Refuse a trajectory whose rows begin anew elsewhere, as of a log appended to itself."""
+    order = np.argsort(trajectory, kind="stable")
+    steps = np.diff(time[order])
+    again = (np.diff(trajectory[order]) == 0) & (np.diff(order) > 1) & (steps < 0)
+    if again.any():
+        before, row = order[int(np.argmax(again)) : int(np.argmax(again)) + 2]
+        raise LogError(
+            f"{source}: trajectory {trajectory[row]} comes again in row {row}, at "
+            f"{time[row]:.6g} s, after {time[before]:.6g} s in row {before}. Give every recording "
+            "a number of its own, and remove those that are there twice"
+        )
 
 
 def check_time_order(
@@ -246,5 +265,6 @@ def check_time_order(
             f"{places}. If a new recording begins there, give the rows a trajectory column; if the "
             "rows are out of order, sort them by time."
         )
+    _refuse_trajectories_that_come_again(time, trajectory, source)
     advances: np.ndarray = np.r_[True, ~(same & (steps == 0))]
     return advances

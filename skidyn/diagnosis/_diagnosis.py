@@ -21,6 +21,7 @@ from skidyn._exceptions import ColumnError, EffectError, LogError, LogWarning, S
 from skidyn._memory import give_back
 from skidyn._order import refuse_shuffled
 from skidyn._signals import Array, Signals, read_signals
+from skidyn._text import counted
 from skidyn.diagnosis._beginnings import look_after_beginnings
 from skidyn.diagnosis._blocks import block_length, time_blocks, variance_inflation
 from skidyn.diagnosis._conclusion import conclude
@@ -480,9 +481,14 @@ def _whiteness(problem: Problem, fit: Fit) -> Array:
 def _check_rows(problem: Problem) -> None:
     empty = [j + 1 for j, n in enumerate(problem.rows.counts) if n < 8]
     if len(empty) == problem.n_joints:
+        signals = problem.signals
+        rows = signals.segments
+        longest = max((signals.clock[r.stop - 1] - signals.clock[r.start] for r in rows), default=0)
         raise LogError(
-            "no joint moves long enough for a diagnosis: the log is too short, scattered in "
-            "time, or all joints are at rest"
+            "no joint moves long enough for a diagnosis: at least 8 averages over windows of "
+            f"motion are needed on a joint. The log has {counted(signals.n_samples, 'sample')} in "
+            f"{counted(len(rows), 'run')} without a gap, the longest of {longest:.3g} s. Record "
+            "some seconds of motion of every joint, in several directions"
         )
 
 

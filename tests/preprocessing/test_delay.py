@@ -69,7 +69,7 @@ def test_messages(log):
 
 
 @pytest.mark.parametrize(
-    ("delay", "told"), [(np.nan, "finite number of s"), (100.0, "no row is left")]
+    ("delay", "told"), [(np.nan, "finite number of s"), (100.0, "no recording is longer")]
 )
 def test_an_impossible_delay_is_refused(log, delay, told):
     with pytest.raises(ValueError, match=told):
