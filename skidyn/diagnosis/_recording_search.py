@@ -14,7 +14,7 @@ from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, rows_together
 from skidyn.diagnosis._hypothesis import UNKNOWN, grouped_by_joints, some_recordings
 from skidyn.diagnosis._recordings import DRIFT, FRICTION, choose, drifting, every_recording
-from skidyn.diagnosis._rule import ALL_LEFT, SURE_SIGN
+from skidyn.diagnosis._rule import ALL_LEFT, SURE_SIGN, SURE_SIGN_SHARE
 from skidyn.diagnosis._search_state import SearchState
 from skidyn.diagnosis._tester import Tester
 
@@ -66,7 +66,8 @@ class RecordingSearch(SearchState):
         error = float(np.sum(self.left[reached] / self.sigma[reached] ** 2))
         error -= 0.0 if candidate in self.chosen else min(removed, error)
         noise = min(1.0, error / max(1.0, float(self._counts[reached].sum())))
-        return bool(lost >= SURE_SIGN * noise * self._price([candidate]))
+        least = max(SURE_SIGN * noise * self._price([candidate]), SURE_SIGN_SHARE * removed)
+        return bool(lost >= least)
 
     def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
         """Effects of few recordings as known effects, those of many recordings as unknown.
