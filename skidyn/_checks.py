@@ -214,17 +214,28 @@ def stamps_jitter(time: np.ndarray, trajectory: np.ndarray) -> bool:
     forward = steps[steps > 0]
     if not len(forward) or len(forward) < len(steps) / 2 or not np.any(steps < 0):
         return False
-    if np.median(forward) > FEW_STEPS * _mean_step(time, trajectory):
-        return False  # rows in any order: they go forward as far as back
     # a restart after a few rows is a new recording, unless there are many steps forward
     least = min(FEW_STEPS, len(forward) / 2)
-    return bool(steps.min() > -least * np.median(forward))
-
-
-def _mean_step(time: np.ndarray, trajectory: np.ndarray) -> float:
-    """Mean step from one time of a trajectory to the next later one."""
     order = np.lexsort((time, trajectory))
-    return float(np.mean(np.diff(time[order])[np.diff(trajectory[order]) == 0]))
+    sorted_steps = np.diff(time[order])[np.diff(trajectory[order]) == 0]
+    usual = np.median(sorted_steps[sorted_steps > 0])  # steps between shuffled rows are long
+    return bool(steps.min() > -least * usual)
+
+
+def _refuse_trajectories_that_come_again(
+    time: np.ndarray, trajectory: np.ndarray, source: str
+) -> None:
+    """Refuse a trajectory whose rows begin anew elsewhere, as of a log appended to itself."""
+    order = np.argsort(trajectory, kind="stable")
+    steps = np.diff(time[order])
+    again = (np.diff(trajectory[order]) == 0) & (np.diff(order) > 1) & (steps < 0)
+    if again.any():
+        before, row = order[int(np.argmax(again)) : int(np.argmax(again)) + 2]
+        raise LogError(
+            f"{source}: trajectory {trajectory[row]} comes again in row {row}, at "
+            f"{time[row]:.6g} s, after {time[before]:.6g} s in row {before}. Give every recording "
+            "a number of its own, and remove those that are there twice"
+        )
 
 
 def check_time_order(
@@ -233,23 +244,16 @@ def check_time_order(
     """Rows to keep so that time increases strictly within each trajectory.
 
     A row with the time of the previous row is left out; a LogError is raised if time goes
-    backwards, which offers even steps if it does so by the jitter of stamps only, also where rows
-    of a trajectory follow after those of others.
+    backwards, which offers even steps if it does so by the jitter of stamps only.
     """
-    order = np.argsort(trajectory, kind="stable")  # a number may occur again later
-    ends = (np.diff(time[order]) < 0) & (np.diff(trajectory[order]) == 0)
-    back = np.flatnonzero(ends)
+    same = trajectory[1:] == trajectory[:-1]
+    steps = np.diff(time)
+    back = np.flatnonzero(same & (steps < 0))
     if len(back):
-        last, row = order[back[0]], order[back[0] + 1]
-        if row > last + 1:
-            raise LogError(
-                f"{source}: trajectory {trajectory[row]} occurs again from row {row} on, where "
-                f"time goes back ({time[row]:.6g} s after {time[last]:.6g} s). If a new recording "
-                "begins there, give it another number; if its rows are a copy, leave them out."
-            )
+        row = int(back[0]) + 1
         places = (
             f"{source}: time goes backwards in {len(back)} place(s), first in row {row} "
-            f"({time[row]:.6g} s after {time[last]:.6g} s, trajectory {trajectory[row]})"
+            f"({time[row]:.6g} s after {time[row - 1]:.6g} s, trajectory {trajectory[row]})"
         )
         if stamps_jitter(time, trajectory):
             raise LogError(
@@ -261,6 +265,6 @@ def check_time_order(
             f"{places}. If a new recording begins there, give the rows a trajectory column; if the "
             "rows are out of order, sort them by time."
         )
-    same = trajectory[1:] == trajectory[:-1]
-    advances: np.ndarray = np.r_[True, ~(same & (np.diff(time) == 0))]
+    _refuse_trajectories_that_come_again(time, trajectory, source)
+    advances: np.ndarray = np.r_[True, ~(same & (steps == 0))]
     return advances

@@ -15,9 +15,11 @@ import json
 import os
 import zipfile
 from collections.abc import Iterable, Iterator
-from copy import copy
+from copy import copy, deepcopy
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from skidyn._exceptions import SkidynError
 from skidyn._optional import import_optional
@@ -85,6 +87,15 @@ _DATA = {
     "TypeNode": frozenset(f"builtins.{name}" for name in ("bool", "float", "int", "str"))
     | _NUMBERS,
 }
+#: Parts of scikit-learn's gradient boosting, which skops does not know: arrays with a class.
+PARTS = frozenset(
+    {
+        "sklearn._loss._loss.CyHalfSquaredError",
+        "sklearn.ensemble._hist_gradient_boosting.predictor.TreePredictor",
+    }
+)
+#: Random generators, which are never loaded.
+GENERATOR = "numpy.random._generator.Generator"
 #: Loaders that make an object from a state or from arguments. They are permitted only for classes:
 #: those of skidyn and scikit-learn by their state, and the user's own, which may need arguments.
 _FROM_STATE = "ObjectNode"
@@ -143,6 +154,20 @@ def save_model(path: Any, model: Any) -> Path:
     if hasattr(model, "diagnosis_"):
         model = copy(model)
         del model.diagnosis_, model.scorer_
+    data, lost = _stored(skops, model, target)
+    if GENERATOR in lost:  # gradient boosting keeps that of its fit, which it does not need again
+        data, lost = _stored(skops, _without_generators(deepcopy(model)), target)
+    if lost:
+        raise SkidynError(
+            f"{type(model).__name__} cannot be stored: it holds {', '.join(sorted(lost))}, but "
+            "only data and classes can be loaded again. Use a class with this method "
+            f"instead.{_instead(model)}"
+        )
+    return write_bytes(target, data)
+
+
+def _stored(skops: Any, model: Any, target: Path) -> tuple[bytes, set[str]]:
+    """A model in the format of skops, and what it holds that is never loaded again."""
     try:
         data = skops.dumps(model)
     except Exception as error:  # any error of an object without an accessible state
@@ -151,14 +176,28 @@ def save_model(path: Any, model: Any) -> Path:
         ) from error
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         nodes = list(_nodes(_description(archive, target)))
-    lost = {name for loader, name in nodes if loader not in _LOADERS}
-    if lost:
-        raise SkidynError(
-            f"{type(model).__name__} cannot be stored: it holds {', '.join(sorted(lost))}, but "
-            "only data and classes can be loaded again. Use a class with this method "
-            f"instead.{_instead(model)}"
-        )
-    return write_bytes(target, data)
+    return data, {name for loader, name in nodes if loader not in _LOADERS}
+
+
+def _without_generators(model: Any) -> Any:
+    """The model, whose fitted gradient boosting has lost its random generators."""
+    stack, seen = [model], set()
+    while stack:
+        part = stack.pop()
+        if id(part) in seen:
+            continue
+        seen.add(id(part))
+        if isinstance(part, list | tuple):
+            stack.extend(part)
+        elif isinstance(part, dict):
+            stack.extend(part.values())
+        elif hasattr(part, "get_params"):
+            own = vars(part)
+            if type(part).__module__.startswith("sklearn.ensemble._hist_gradient_boosting"):
+                for name in [k for k, v in own.items() if isinstance(v, np.random.Generator)]:
+                    del own[name]
+            stack.extend(own.values())
+    return model
 
 
 def _instead(model: Any) -> str:
@@ -217,7 +256,7 @@ def load_model(path: str | os.PathLike[str], *, trusted: Iterable[str] = ()) -> 
             raise SkidynError(f"{source}: cannot be loaded: {error}") from error
     foreign = sorted({name for loader, name in nodes if not _is_known(loader, name, own)})
     if not foreign:
-        named = sorted({name for _, name in nodes if name in CLASSES} | own)
+        named = sorted({name for _, name in nodes if name in CLASSES or name in PARTS} | own)
         try:
             foreign = sorted(set(skops.get_untrusted_types(file=source)) - set(named))
             if not foreign:
@@ -237,6 +276,8 @@ def _is_known(loader: str, name: str, trusted: frozenset[str]) -> bool:
     """Whether a node may be created; skops checks scikit-learn's classes later."""
     if loader in _DATA:
         return name in _DATA[loader] or (loader == "TypeNode" and name in CLASSES | trusted)
+    if loader == "LossNode":  # made without arguments
+        return name in PARTS or name in trusted
     if loader == _FROM_STATE:
         return name in CLASSES or name in trusted or name.startswith("sklearn.")
     return loader in _FROM_ARGUMENTS and name in trusted

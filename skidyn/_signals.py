@@ -446,15 +446,15 @@ def refuse_equal_times(signals: Signals, column: str) -> None:
     for name, times in zip(names, np.split(signals.time, ends), strict=True):
         if len(times) > 2:
             still.append(float(np.mean(np.diff(times) == 0)))
-            if still[-1] == 1:
-                told = f"is {times[0]:.9g} in all {len(times)} rows of trajectory {name:g}"
+            if still[-1] == 1 and not told:
+                told = f"all {len(times)} rows of trajectory {name:g}, {times[0]:.9g} s"
     if still and not told and min(still) > 0.5:
-        told = f"repeats its value of the row before in at least {min(still):.0%} of the rows"
+        told = f"at least {min(still):.0%} of the rows"
     if told:
         raise ColumnError(
-            f"the column {column} of X, the time in s, {told}; leave out repeated rows and give "
-            "times that advance, in float64, since float32 cannot hold seconds since 1970 unless "
-            "the start is subtracted"
+            f"the times in column {column} of X are equal to those of the row before in {told}; "
+            "leave out repeated rows and give times in s that advance, in float64, since float32 "
+            "cannot hold seconds since 1970 unless the start is subtracted, or give time=None"
         )
 
 

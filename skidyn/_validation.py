@@ -42,10 +42,12 @@ def validate_motion(estimator: Any, X: Any, *args: Any, **options: Any) -> Any:
 def _not_finite(what: str, table: Any) -> str | None:
     """The first cell that is no finite number, and what to do, or None."""
     names = column_names(table)
-    array = np.asarray(table) if names is None else None
-    for k in range(1 if array is not None and array.ndim == 1 else np.shape(table)[1]):
-        values = np.reshape(array, (len(table), -1))[:, k] if names is None else table[names[k]]
-        name = f"column {k}" if names is None else f"column {names[k]!r}"
+    if names is None:
+        array = np.asarray(table).reshape(len(table), -1)
+        columns = {f"column {k}": values for k, values in enumerate(array.T)}
+    else:
+        columns = {f"column {name!r}": table[name] for name in names}
+    for name, values in columns.items():
         for row, value in enumerate(np.asarray(values).tolist()):
             try:
                 number = float(value)

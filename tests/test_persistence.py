@@ -25,7 +25,7 @@ from skidyn.committee import ELMCommittee
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import EffectSearchCV, Settings
 from skidyn.exceptions import SkidynError
-from skidyn.hybrid import HybridRegressor
+from skidyn.hybrid import HybridRegressor, OwnJointRegressor
 from skidyn.identification import RBDRegressor
 from skidyn.neural_network import BLLRegressor, LSTMRegressor, NDLRegressor, SDLRegressor
 from skidyn.preprocessing import SmoothDerivatives
@@ -56,10 +56,11 @@ def learners(robot):
         ELMCommittee(2, n_hidden=10, random_state=0),
         HybridRegressor(physics, lstm, cv=2, alpha=1.0),
         HybridRegressor(physics, cv=2, alpha=1.0),
+        OwnJointRegressor(),
     ]
 
 
-@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("number", range(7))
 def test_every_learner_comes_back(tmp_path, number):
     log = make_hidden_effect_log(
         load_planar_arm(), "spring", n_trajectories=4, duration=3.0, rate=25.0

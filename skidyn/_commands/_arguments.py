@@ -15,6 +15,16 @@ class Input(str):
     """A file that a command reads, and never writes."""
 
 
+def number_of_processes(text: str) -> int:
+    """A number of processes from 1 on, or -1 for one on each core."""
+    number = int(text) if text.removeprefix("-").isdigit() else 0
+    if number < 1 and number != -1:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no number of processes; expected 1 or more, or -1 for one on each core"
+        )
+    return number
+
+
 class Output(str):
     """A file that a command writes; its ending determines its kind.
 

@@ -222,5 +222,5 @@ def _print_pair(summary: dict[str, Any]) -> None:
         print("What is missing")
     for finding in report["findings"]:
         title = " or ".join(dict.fromkeys(filter(None, finding["titles"])))
-        where = "in both" if len(finding["in"]) == 2 else f"only in {finding['in'][0]}"
+        where = "in both" if len(finding["in"]) == 2 else f"missing only in {finding['in'][0]}"
         print(f"  {title} on joint {finding['joint']}: {where}")

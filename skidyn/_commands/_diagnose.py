@@ -10,7 +10,14 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from skidyn._commands._arguments import JsonFile, Page, command, with_controller, with_log
+from skidyn._commands._arguments import (
+    JsonFile,
+    Page,
+    command,
+    number_of_processes,
+    with_controller,
+    with_log,
+)
 from skidyn._commands._earlier import stored
 from skidyn._commands._input import read_inputs
 from skidyn._commands._kept import Kept, noting
@@ -70,7 +77,7 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument(
         "--jobs",
-        type=int,
+        type=number_of_processes,
         default=-1,
         metavar="N",
         help="maximum number of processes (default: one for each core; one on systems other than "

@@ -143,10 +143,13 @@ class JudgingSearch(ChoosingSearch):
     def due_to_positions(self, hypothesis: Hypothesis) -> bool:
         """Whether noise of the positions alone explains much of what an explanation removes."""
         reached = {j for c in hypothesis.candidates for j in c.rows}
-        if hypothesis.torque is not None or not reached & self.coarse():
+        if hypothesis.torque is not None:
             return False
-        tester, imitation = self.tester(self.chosen), self.imitation()
+        tester = self.tester(self.chosen)
         removed = sum(tester.test(c.rows).drop for c in hypothesis.candidates)
+        if self.power_of_positions(reached) <= IMITATED * removed:
+            return False
+        imitation = self.imitation()
         rows = (imitation.problem.term_rows(c.term) for c in hypothesis.candidates)
         imitated = sum(imitation.test(own).drop for own in rows)
         return imitated > IMITATED * removed

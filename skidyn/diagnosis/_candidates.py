@@ -193,8 +193,9 @@ def catalogue_candidates(
     terms: list[Term] = []
     for kind in kinds:
         effect = get_effect(kind)
-        if effect.search == "trajectories" and not problem.rigid_body and problem.robot is not None:
-            # With the URDF's own bodies even a permanent load can be detected.
+        fixed = not problem.rigid_body or not effect.is_body
+        if effect.search == "trajectories" and fixed and problem.robot is not None:
+            # Identified bodies take in a permanent load; those of the URDF do not.
             joints = tuple(range(problem.n_joints))
             terms += [Term.at(kind, joints, shape) for shape in effect.grid(few, joints)]
             continue

@@ -218,9 +218,15 @@ def find_rest_errors(comparison: Comparison) -> list[RestError]:
             # the friction at rest in the model is one of many possible values
             free = residual + friction[here]
             beyond = float(np.sqrt(np.mean(np.maximum(np.abs(free) - stiction, 0.0) ** 2)))
-            text += f"; dry friction can balance up to ±{stiction:.2g} {unit} of it"
+            text += (
+                " (root mean square); dry friction can balance any torque up to "
+                f"{stiction:.2g} {unit}"
+            )
             if beyond > 0.1 * rmse:
-                text += f", and {beyond:.2g} {unit} exceeds this limit"
+                text += (
+                    f", and what it cannot balance in single samples is {beyond:.2g} {unit} "
+                    "(root mean square)"
+                )
         found.append(RestError(j + 1, name, rmse, stiction, beyond, float(here.mean()), text + "."))
     return found
 

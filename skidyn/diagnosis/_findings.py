@@ -37,6 +37,8 @@ from skidyn.evidence import Problem
 RIVAL_SHARE = 0.8
 #: A known effect that removes at least this share of what an unknown function removes is told.
 NEAREST_SHARE = 0.5
+#: Width of its interval, as a share of a parameter, above which another one is told before it.
+WIDE = 0.6
 #: Points of a curve.
 BINS = 40
 #: Number of times at which an effect acts that are listed.
@@ -375,8 +377,8 @@ def told_briefly(
     where = joints_told(joints)
     if trajectories is not None:
         where += f" in {trajectories_told(trajectories)}"
-    # the first that is not zero, with the other components of its vector
-    rows = sorted(parameters.items(), key=lambda item: _may_be_zero(item[1]))
+    # the first that is clearly not zero, with the other components of its vector
+    rows = sorted(parameters.items(), key=lambda item: _doubt_of(item[1]))
     stem = _stem(rows[0][0]) if rows else ""
     own = [_value(name, row) for name, row in parameters.items() if _stem(name) == stem]
     sizes = ", ".join(filter(None, own))
@@ -440,10 +442,14 @@ def _fall_told(drop: float, averaged: float | None) -> str:
     )
 
 
-def _may_be_zero(row: dict[str, Any]) -> bool:
-    """Whether the interval of a parameter contains zero."""
+def _doubt_of(row: dict[str, Any]) -> int:
+    """2 if the interval of a parameter contains zero, 1 if it is wide, 0 otherwise."""
     value, low, high = row["value"], row["low"], row["high"]
-    return isinstance(value, float) and low is not None and bool(low <= 0 <= high)
+    if not isinstance(value, float) or low is None:
+        return 0
+    if low <= 0 <= high:
+        return 2
+    return int(high - low > WIDE * abs(value))
 
 
 def _value(name: str, row: dict[str, Any]) -> str:

@@ -23,9 +23,12 @@ import numpy as np
 
 from skidyn._signals import Array
 from skidyn.diagnosis._noise import as_measured, sensor_noise
-from skidyn.diagnosis._remainder import position_noise
+from skidyn.diagnosis._remainder import position_noise, position_noises
 from skidyn.diagnosis._rule import SLOW_MOTION
 from skidyn.evidence import Fit, Problem, make_problem, smooth_motion
+
+#: What keeps a ratio to a noise of zero finite, N m or N.
+TINY = 1e-300
 
 
 def coarse_joints(problem: Problem, fit: Fit, residual: Array) -> set[int]:
@@ -47,6 +50,27 @@ def coarse_joints(problem: Problem, fit: Fit, residual: Array) -> set[int]:
         return set()
     sensor = np.nan_to_num(sensor_noise(problem.signals, residual, problem.measured))
     return set(np.flatnonzero(2 * position_noise(problem, fit) ** 2 > sensor**2).tolist())
+
+
+def power_of_positions(problem: Problem, fit: Fit, sigma: Array) -> Array:
+    """Square of the torque that the noise of positions causes in averaged rows, (n_joints,).
+
+    Over that of the noise of a row, as what an explanation removes; no explanation can remove more.
+
+    Parameters
+    ----------
+    problem : Problem
+        Motion and logged positions.
+    fit : Fit
+        A model.
+    sigma : ndarray of shape (n_joints,)
+        Noise of the rows, N m or N.
+    """
+    if problem.of_residual:
+        return np.zeros(problem.n_joints)
+    return np.asarray(
+        problem.rows.counts * (position_noises(problem, fit)[1] / np.maximum(sigma, TINY)) ** 2
+    )
 
 
 def imitate(problem: Problem, fit: Fit) -> Problem:

@@ -159,7 +159,9 @@ def _held_out(
         waves |= {term: {place: line[:, place]} for term, place in places}
     rest = [t for t in terms if t not in waves]
     bare = replace_torque(problem, torque) if waves else problem
-    residual, held = held_out_residual(bare, rest, result.fit.sigma, keep)
+    # Joints weigh by the errors of these terms, as where a model with them is fitted.
+    own = result.fit if len(rest) == len(result.fit.terms) else bare.fit(rest)
+    residual, held = held_out_residual(bare, rest, own.sigma, keep)
     return residual, held | waves
 
 

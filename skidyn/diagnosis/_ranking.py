@@ -505,14 +505,11 @@ class RankingSearch(LineSearch):
         if refined and any(c.n_shapes for c in candidates):
             candidates, after = self._refined(candidates, within)
             hypothesis = replace(hypothesis, candidates=tuple(candidates))
-            beside = [[o for o in candidates if o is not c] for c in candidates]
-            if not all(
-                self.can_be(c, [*self.chosen, *rest])
-                for c, rest in zip(candidates, beside, strict=True)
-            ):
-                return None
         else:
             after = self._errors(hypothesis, within)
+        for c in candidates:
+            if not self.can_be(c, [*self.chosen, *(o for o in candidates if o is not c)]):
+                return None
         gain = log_likelihood_gain(self.errors_now(within), after, self.problem.rows.counts)
         count = self._n_parameters(candidates)
         price = 2 * self._price(candidates)

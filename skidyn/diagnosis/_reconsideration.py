@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -32,6 +33,9 @@ from skidyn.diagnosis._rule import BETWEEN, IN_MOST, NEARLY, REMAINDER_TIMES_NOI
 from skidyn.diagnosis._search_state import still_free
 from skidyn.diagnosis._split import recordings_with
 from skidyn.effects import Term, get_effect
+
+#: Effects with another size in most recordings that are one of all of them, which changes.
+PLAIN = (*FRICTION, "offset")
 
 
 class ReconsideringSearch(DuellingSearch):
@@ -117,14 +121,14 @@ class ReconsideringSearch(DuellingSearch):
         return max(judged, key=lambda h: h.score, default=None)
 
     def _plain_first(self, best: Hypothesis) -> tuple[Hypothesis, Sequence[Candidate]]:
-        """Friction that the model lacks and that changes, instead of sizes for most recordings.
+        """Friction or an offset that changes, instead of sizes for most recordings.
 
-        With the terms of the change, beside which the plain friction has to be significant: with
+        With the terms of the change, beside which the plain effect has to be significant: with
         one size in all recordings, it leaves more than it removes in some of them.
         """
         names, own = self.problem.rows.recordings, grouped_by_joints(best.candidates)
         shares = [recordings_with(best.kind, some, names).mean() for some in own]
-        if best.kind not in FRICTION or min(map(len, own)) < 2 or min(shares) <= IN_MOST:
+        if best.kind not in PLAIN or min(map(len, own)) < 2 or min(shares) <= IN_MOST:
             return best, ()
         joints = {some[0].joints for some in own}
         plain = [c for c in self.pool if c.kind == best.kind and c.joints in joints]
@@ -213,20 +217,35 @@ class ReconsideringSearch(DuellingSearch):
         return None
 
     def _second_name(self, first: Hypothesis, function: Hypothesis) -> Hypothesis | None:
-        """A known effect that together with a first one is as good as a function."""
+        """A known effect that together with a first one is as good as a function.
+
+        If it is not as it stands, the shape of the first one, which was fitted to both, is searched
+        again beside it.
+        """
         left, removed = self.left_and_removed(function)
+        as_good = partial(self._good_enough, least=left, removed=removed, joints=function.joints)
         kept = self._state()
         self.add(first)
         self.refit()
         self.sigma = self.weights()
-        found = [h for h in self._known_alone() if set(function.joints) <= set(h.joints)]
+        beside = self._state()
+        second = None
+        for h in self._known_alone():
+            if not set(function.joints) <= set(h.joints) or h.errors is None:
+                continue
+            if as_good(h.errors.sum(0)) or as_good(self._left_once_settled(first, h)):
+                second = h
+                break
+            self._restore(beside)
         self._restore(kept)
-        for h in found:
-            if h.errors is not None and self._good_enough(
-                h.errors.sum(0), left, removed, function.joints
-            ):
-                return h
-        return None
+        return second
+
+    def _left_once_settled(self, first: Hypothesis, second: Hypothesis) -> Array:
+        """Held-out error with a second effect and the shape of the first searched beside it."""
+        self.add(second)
+        self.refit()
+        self._settled(first)
+        return self._left()
 
     def _hidden_names(self, function: Hypothesis, tried: Collection[str]) -> list[Hypothesis]:
         """Known effects on the joint of a function of several signals, significant or not.

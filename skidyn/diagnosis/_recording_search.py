@@ -7,11 +7,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+from scipy.linalg import null_space
+
+from skidyn._signals import Array
 from skidyn.diagnosis._candidates import Candidate, rows_together
 from skidyn.diagnosis._hypothesis import UNKNOWN, grouped_by_joints, some_recordings
 from skidyn.diagnosis._recordings import DRIFT, FRICTION, choose, drifting, every_recording
-from skidyn.diagnosis._rule import ALL_LEFT
+from skidyn.diagnosis._rule import ALL_LEFT, SURE_SIGN, SURE_SIGN_SHARE
 from skidyn.diagnosis._search_state import SearchState
+from skidyn.diagnosis._tester import Tester
 
 
 class RecordingSearch(SearchState):
@@ -38,8 +43,31 @@ class RecordingSearch(SearchState):
 
     def can_be(self, candidate: Candidate, others: Sequence[Candidate]) -> bool:
         """Whether a candidate's coefficients, together with others, are physically possible."""
-        size = self.tester(others).test(candidate.rows).coefficients
-        return candidate.can_have(size, self.problem.few)
+        tester, few, term = self.tester(others), self.problem.few, candidate.term
+        size = tester.test(candidate.rows).coefficients
+        if not candidate.can_have(size, few):
+            return False
+        weights = term.effect.positive(few, term.places, term.shape)
+        return weights is None or not (
+            weights @ size < 0 and self._is_sure(weights, candidate, tester)
+        )
+
+    def _is_sure(self, weights: Array, candidate: Candidate, tester: Tester) -> bool:
+        """Whether a sum of a candidate's coefficients is not zero, by what is lost where it is.
+
+        In units of the noise that is left with the candidate: most of that without it may be the
+        torque of the candidate.
+        """
+        zero = null_space(weights[None] / np.linalg.norm(weights))
+        bound = {j: block @ zero for j, block in candidate.rows.items()}
+        removed = tester.estimate(candidate.rows)[1]
+        lost = removed - tester.estimate(bound)[1]
+        reached = list(candidate.rows)
+        error = float(np.sum(self.left[reached] / self.sigma[reached] ** 2))
+        error -= 0.0 if candidate in self.chosen else min(removed, error)
+        noise = min(1.0, error / max(1.0, float(self._counts[reached].sum())))
+        least = max(SURE_SIGN * noise * self._price([candidate]), SURE_SIGN_SHARE * removed)
+        return bool(lost >= least)
 
     def _same_or_own(self, chosen: Sequence[Candidate]) -> list[list[Candidate]]:
         """Effects of few recordings as known effects, those of many recordings as unknown.

@@ -142,6 +142,11 @@ MUCH = 0.1
 #: (``nothing_hidden.py``).
 LITTLE, SURE_OF_LITTLE, LITTLE_OF_DERIVATIVES = 0.005, 0.9, 0.02
 
+#: Squared error, in units of the noise with its correlation, that an explanation must lose where a
+#: sum of its coefficients is zero for the sign of this sum to be sure: three standard errors; and
+#: the share of what it removes, since an imperfect formula beside bodies that are free needs some.
+SURE_SIGN, SURE_SIGN_SHARE = 9.0, 0.05
+
 #: Ratio of the ends of its interval above which the only number of an effect is not determined.
 #: Of the names in thirteen collections of logs, one had such an interval, and was wrong.
 UNDETERMINED = 30.0

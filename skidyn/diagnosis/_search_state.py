@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from skidyn.diagnosis._blocks import variance_inflation
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
 from skidyn.diagnosis._held_out import shares_of_folds
 from skidyn.diagnosis._hypothesis import UNKNOWN, Hypothesis, terms_on_rows, uses_the_fit
-from skidyn.diagnosis._imitation import coarse_joints, imitate
+from skidyn.diagnosis._imitation import imitate, power_of_positions
 from skidyn.diagnosis._looked_at import SAME, LookedAt
 from skidyn.diagnosis._nameless_candidates import nameless_candidates
 from skidyn.diagnosis._profile import profile_error
@@ -152,6 +152,7 @@ class SearchState:
     def _restore(self, kept: Kept) -> None:
         for name, value in kept._asdict().items():
             setattr(self, name, value)
+        self.findings = list(kept.findings)  # it may be restored again
         self.refit()
 
     def add(self, best: Hypothesis) -> None:
@@ -226,9 +227,14 @@ class SearchState:
         forms = max(self.settings.nameless_tried if one_of_many else 1, candidate.n_chosen)
         return self.n_tests * forms * candidate.n_parts
 
-    def coarse(self) -> set[int]:
-        """Joints, from 0, most of whose noise is that of positions."""
-        return coarse_joints(self.problem, self.fit, self.residual)
+    def power_of_positions(self, joints: Collection[int]) -> float:
+        """The most that an explanation can remove of the noise of positions on some joints."""
+
+        def make() -> Array:
+            return power_of_positions(self.problem, self.fit, self.sigma)
+
+        power: Array = self._last.get("power of positions", self._made_of, make)
+        return float(power[list(joints)].sum())
 
     def imitation(self) -> Tester:
         """Tests on the log as it would be if the present model lacked nothing."""

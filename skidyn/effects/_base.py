@@ -66,6 +66,9 @@ class Effect:
     leading : int
         With ``search="trajectories"``: number of first coefficients that every single trajectory
         determines; all of them if 0.
+    is_body : bool
+        With ``search="trajectories"``: whether the identified bodies take it in if it is there in
+        all trajectories.
     places : tuple of str
         With ``search="trajectories"``: entries of the shape for other places than the usual one
         (:meth:`elsewhere`).
@@ -145,6 +148,7 @@ class Effect:
     needs: ClassVar[tuple[str, ...]] = ()
     automatic: ClassVar[bool] = True
     leading: ClassVar[int] = 0
+    is_body: ClassVar[bool] = False
     places: ClassVar[tuple[str, ...]] = ()
     elsewhere_must_gain: ClassVar[float] = 1.0
     grows: ClassVar[bool] = False
@@ -281,6 +285,27 @@ class Effect:
             True by default.
         """
         return True
+
+    def positive(
+        self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]
+    ) -> Array | None:
+        """Weights of the coefficients in a sum that must not be clearly negative.
+
+        Parameters
+        ----------
+        signals : Signals
+            Motion.
+        joints : sequence of int
+            Places of the term's joints in arrays.
+        shape : mapping
+            Shape parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_coefficients,) or None
+            None by default.
+        """
+        return None
 
     def usually(
         self,
@@ -596,6 +621,21 @@ class Effect:
         for turning, sliding in (("kg m^2", "kg"), ("N m", "N"), ("rad", "m")):
             units = {name: unit.replace(turning, sliding) for name, unit in units.items()}
         return units
+
+    def formula_of(self, shape: Mapping[str, Any]) -> str:
+        """The formula that a shape selects, in LaTeX.
+
+        Parameters
+        ----------
+        shape : mapping
+            Shape parameters.
+
+        Returns
+        -------
+        str
+            :attr:`formula` by default, which has all forms.
+        """
+        return self.formula
 
     def describe(self) -> dict[str, Any]:
         """All information printed in the catalogue, the report and the documentation.

@@ -144,8 +144,8 @@ def make_new_terms(spec: TermSpec, known: Iterable[TermSpec], n_joints: int) -> 
     if twice:
         where = joints_told(sorted({joint for term in twice for joint in term.joints}))
         raise EffectError(
-            f"the model already has {twice[0].kind} on {where}; add it on other joints, or add "
-            "another effect"
+            f"the model has {twice[0].kind} on these joints already: {where}; add it on other "
+            "joints, or add another effect"
         )
     return terms
 

@@ -85,7 +85,7 @@ class NonlinearSpring(Effect):
     that units are the same; with a ``scale``, in rad or m, it is the third power times the
     hyperbolic sine of the distance divided by ``scale``, as rubber stiffens. A piecewise linear
     spring has ``low`` and ``high`` in its shape, the positions between which its stiffness is
-    ``k1``; below, it is ``k2``, and above, ``k3``, all in N m/rad. Springs with two rates, with
+    ``k_between``; below, it is ``k_below``, and above, ``k_above``. Springs with two rates, with
     slack, or that yield beyond some torque have this form.
     """
 
@@ -97,6 +97,12 @@ class NonlinearSpring(Effect):
         Coefficient("k2", "N m/rad^2"),
         Coefficient("k3", "N m/rad^3"),
         Coefficient("tau0", "N m", is_zero=True),
+    )
+    #: Stiffness of the pieces.
+    pieces = (
+        Coefficient("k_between", "N m/rad"),
+        Coefficient("k_below", "N m/rad"),
+        Coefficient("k_above", "N m/rad"),
     )
     shapes = (
         Shape("low", "rad", (), -np.inf, np.inf, spacing="linear", scales=False),
@@ -157,6 +163,28 @@ class NonlinearSpring(Effect):
         wide = shape["high"] - shape["low"] > NARROW * (q.max() - q.min())
         return bool(wide) and min(least) > FEWEST_TOUCHING
 
+    def positive(
+        self, signals: Signals, joints: Sequence[int], shape: Mapping[str, Any]
+    ) -> Array | None:
+        # A spring pushes back over its travel as a whole; one that does not is a counterweight.
+        q = signals.q[:, joints[0]]
+        return np.asarray((q - q.mean()) @ self.columns(signals, joints[0], **shape))
+
+    def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
+        return (*self.pieces, self.coefficients[-1]) if "low" in shape else self.coefficients
+
+    def formula_of(self, shape: Mapping[str, Any]) -> str:
+        if "low" in shape:
+            return (
+                r"k_\mathrm{between}\,\min(\max(q, q_l), q_h) + k_\mathrm{below}\min(0, q - q_l) "
+                r"+ k_\mathrm{above}\max(0, q - q_h) + \tau_0"
+            )
+        if "scale" in shape:
+            return r"k_1 x + k_2 x^2 + k_3\,l^3\sinh(x/l) + \tau_0,\quad x = q - q_r"
+        if "power" in shape:
+            return r"k_1 x + k_2 x^2 + k_3\,\mathrm{sign}(x)|x|^p + \tau_0,\quad x = q - q_r"
+        return self.formula
+
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         q = signals.q[:, joint]
         if "low" in shape:
@@ -171,8 +199,9 @@ class NonlinearSpring(Effect):
         return np.column_stack([x, x**2, power, np.ones_like(x)])
 
     def units(self, prismatic: bool = False) -> dict[str, str]:
-        length = "m" if prismatic else "rad"
-        return super().units(prismatic) | {"q_middle": length}
+        length, stiffness = ("m", "N/m") if prismatic else ("rad", "N m/rad")
+        pieces = {c.name: stiffness for c in self.pieces}
+        return super().units(prismatic) | pieces | {"q_middle": length}
 
 
 class GravityCompensator(Effect):
@@ -304,7 +333,7 @@ class EndStop(Effect):
         q, unit = signals.q[:, joints[0]], signals.unit[joints[0]]
         stops = [
             {"q_lim": float(side * np.quantile(side * q, share)), "side": side}
-            for share in (0.80, 0.84, 0.88, 0.92, 0.95)
+            for share in (0.80, 0.84, 0.88, 0.92, 0.95, 0.55, 0.65, 0.72)
             for side in (1.0, -1.0)
         ]
         further, stronger, foam, *damped, _, both_damped, one_way = map(dict, self.forms)

@@ -119,6 +119,7 @@ class Payload(_ToolEffect):
 
     kind = "payload"
     is_exact = True
+    is_body = True
     drawn_against = "q"
     title = "Payload"
     formula = r"Y_n(q, \dot q, \ddot q)\,\pi_\mathrm{payload}"

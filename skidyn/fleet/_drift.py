@@ -12,6 +12,7 @@ from scipy import stats
 
 from skidyn._exceptions import SkidynError
 from skidyn._signals import Array
+from skidyn._text import trajectories_told
 from skidyn.evidence import Evidence
 from skidyn.fleet._deviation import deviation, effect_columns
 from skidyn.identification import weighted_solution
@@ -119,7 +120,8 @@ def monitor_drift(
     Raises
     ------
     SkidynError
-        Fewer than 8 reference trajectories, or none after them.
+        Fewer than 8 reference trajectories, or none after them; a false-alarm rate that is no
+        probability; a trajectory without a date.
 
     References
     ----------
@@ -144,6 +146,14 @@ def monitor_drift(
         raise SkidynError(
             f"{len(names)} trajectories with reference={reference}; at least 8 reference "
             "trajectories and one after them are needed"
+        )
+    if not 0 < false_alarm < 1:
+        raise SkidynError(f"false_alarm={false_alarm!r}; a probability between 0 and 1 is expected")
+    undated = [] if dates is None else [k for k in names if k not in dates]
+    if undated:
+        raise SkidynError(
+            f"dates lacks {trajectories_told(undated)}; give the date of every trajectory, or "
+            "dates=None"
         )
     chosen = effect_columns(evidence, columns)
     index = [evidence.columns.index(name) for name in chosen]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from skidyn._columns import column_names, command_columns, names_of_table, resolve_columns
 from skidyn._exceptions import SkidynError
-from skidyn._signals import Array, Signals, rates_of, signals_from
+from skidyn._signals import Array, Signals, rates_of, refuse_other_order, signals_from
 from skidyn._text import counted
 from skidyn.evidence import smooth_motion
 from skidyn.forward._controller import Controller
@@ -57,13 +57,24 @@ def read_task(
     model: Any, X: Any, y: Any, controller: Controller | None, horizon: float | None
 ) -> Task:
     """Signals, pieces and drive of a log."""
+    if not hasattr(model, "robot_"):
+        raise SkidynError(
+            f"{type(model).__name__} has no fitted robot: give a fitted RBDRegressor; the physical "
+            "part of a hybrid model is its physics_"
+        )
     n = model.robot_.n_joints
     if (y is None) == (controller is None):
         raise SkidynError("give either the torque y or a controller, which follows q_ref1..")
     signals = motion_of(model, X)
     windows = make_windows(signals, horizon)
     if controller is None:
-        torque = np.asarray(y, dtype=float).reshape(len(signals.q), -1)
+        refuse_other_order(y, model.robot_)
+        torque = np.asarray(y, dtype=float)
+        if len(torque) != len(signals.q):
+            raise SkidynError(
+                f"y has {len(torque)} rows and X {len(signals.q)}; give the torque of every row"
+            )
+        torque = torque.reshape(len(signals.q), -1)
         if torque.shape[1] != n:
             raise SkidynError(
                 f"y has {torque.shape[1]} column(s); the robot has {counted(n, 'joint')}"

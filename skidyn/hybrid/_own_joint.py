@@ -163,8 +163,9 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
             there = sum(re.fullmatch(r"q\d+", str(name)) is not None for name in names)
             if there > n_joints:
                 raise ColumnError(
-                    f"X has the motion of {there} joints, and y the torque of {n_joints}: give the "
-                    "torque of every joint, or state whose it is, such as joint_names=['2']"
+                    f"X has the motion of {there} joints, and y the torque of {n_joints}, of which "
+                    "numbers do not tell whose it is: give the torque of every joint, or name the "
+                    "columns after them (q_elbow, dq_elbow, ..) and give joint_names=['elbow']"
                 )
         if joints is None:
             joints = [str(j + 1) for j in range(n_joints)]

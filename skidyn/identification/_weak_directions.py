@@ -11,8 +11,10 @@ base parameters with the effects eliminated, and ``C`` the covariance of the bas
 relative changes of all bodies by 1, they are the eigenvectors of ``S`` with respect to ``C^-1``.
 For an eigenvalue ``l`` the relative standard error of the data is ``1/sqrt(l)``. The relative error
 of the URDF, ``t``, and the excess of the rows' scatter over white noise, ``f``, maximise the
-likelihood of the least-squares coordinates ``z ~ N(0, t^2 + f / l)`` times weak priors (empirical
-Bayes). With ``x = l t^2 / f`` a direction keeps the share ``x^3 / (1 + x^3)`` of its distance from
+likelihood of the least-squares coordinates ``z``, of variance ``t^2 + f / l`` and Student's law,
+times weak priors (empirical Bayes): an effect that the model lacks, such as a counterweight, moves
+a few of them far. Where left-out folds contradict their ratio, a larger one is used.
+With ``x = l t^2 / f`` a direction keeps the share ``x^3 / (1 + x^3)`` of its distance from
 the URDF. With the third power the transition is sharp: a direction that the data determines ten
 times better than the URDF changes by one part in a million.
 
@@ -53,6 +55,14 @@ RESOLVED = 1e-8
 #: Usual relative error of URDFs and usual excess of the rows' scatter over white noise, and the
 #: factors by which both differ between robots.
 USUAL, FACTOR = (0.3, 1.0), (3.0, 10.0)
+#: Degrees of freedom of Student's law of the coordinates, of which few are far from the others.
+TAIL = 2.0
+#: Factor between the ratios that are tried on left-out folds, and the largest one: that of bodies
+#: which may be anything, and rows whose scatter is white noise.
+RATIO_STEP, MOST_RATIO = 4.0, 1.0
+#: Share of the rows, in units of their noise, by which the error of left-out folds must be larger
+#: for directions to be released that most likely are weak.
+MATERIAL = 0.05
 #: Largest pull on a direction relative to its information; keeps the left-out sums finite.
 MOST_PULL = 1e12
 
@@ -85,8 +95,7 @@ def keep_weak_directions(
 
     z = found.into @ coefficients[:n]
     spread, excess = _spreads(z, values)
-    known = values * spread**2 / excess
-    share = known**POWER / (1 + known**POWER)
+    share = _supported(found, spread**2 / excess, grams, cross, float(whole.counts.sum()))
     if whole.instruments is not None or not trusted:
         # Instruments remove a bias that the information does not contain: only open directions are
         # kept.
@@ -147,6 +156,35 @@ class _Directions:
         return cls(values, root @ vectors, vectors.T @ np.linalg.inv(root), follow)
 
 
+def _supported(
+    found: _Directions, likely: float, grams: Array, cross: Array, n_rows: float
+) -> Array:
+    """Share of its distance from the URDF that every direction keeps.
+
+    With the least ratio ``t^2 / f``, from the most likely one up to :data:`MOST_RATIO`, whose error
+    of left-out folds is that of the best one to within its standard error (L. Breiman et al. 1984,
+    Classification and Regression Trees, chapter 3.4.3) or :data:`MATERIAL`. Folds that are alike do
+    not show what another motion would, so that a small gain is no reason to trust weak directions.
+    """
+    tried = [likely]
+    while tried[-1] < MOST_RATIO and len(grams) > 1:
+        tried.append(min(MOST_RATIO, tried[-1] * RATIO_STEP))
+    shares = [_shares(found.values, ratio) for ratio in tried]
+    errors = []
+    for share in shares:
+        left = _pulled(found, share, grams, cross)
+        errors.append(
+            np.einsum("ki,kij,kj->k", left, grams, left) - 2 * np.sum(left * cross, axis=1)
+        )
+    behind = [error - min(errors, key=np.sum) for error in errors]
+    small = MATERIAL * n_rows
+    return next(
+        share
+        for share, own in zip(shares, behind, strict=True)
+        if len(own) < 2 or own.sum() <= max(small, own.std(ddof=1) * np.sqrt(len(own)))
+    )
+
+
 def _pulled(found: _Directions, share: Array, grams: Array, cross: Array) -> Array:
     """Fits without each fold, of whose directions the data keeps the same shares."""
     n, p = len(found.values), cross.shape[-1]
@@ -170,6 +208,12 @@ def prior_root(robot: Robot) -> Array:
     return np.asarray(size[:, None] * root)
 
 
+def _shares(values: Array, ratio: float) -> Array:
+    """Share of its distance from the URDF that every direction keeps, for a ratio t^2 / f."""
+    known = values * ratio
+    return np.asarray(known**POWER / (1 + known**POWER))
+
+
 def _spreads(z: Array, values: Array) -> tuple[float, float]:
     """Most likely relative error of the URDF and excess of the rows' scatter."""
     seen = values > RESOLVED * max(values.max(initial=0.0), 1e-300)
@@ -180,9 +224,10 @@ def _spreads(z: Array, values: Array) -> tuple[float, float]:
     def loss(at: Array) -> tuple[float, Array]:
         parts = np.exp(2 * at[0]), np.exp(at[1]) * noise
         variance = parts[0] + parts[1]
-        slope = (1 - squares / variance) / variance
+        tail = TAIL + squares / variance
+        slope = (1 - (TAIL + 1) * squares / variance / tail) / variance
         doubt = (at - np.log(USUAL)) / np.log(FACTOR)
-        value = float(np.sum(np.log(variance) + squares / variance) + doubt @ doubt)
+        value = float(np.sum(np.log(variance) + (TAIL + 1) * np.log(tail)) + doubt @ doubt)
         gradient = np.array([2 * parts[0] * slope.sum(), parts[1] @ slope])
         return value, gradient + 2 * doubt / np.log(FACTOR)
 

@@ -171,11 +171,8 @@ def mend_rows(table: pd.DataFrame, n: int, remedies: Remedies, notes: list[str])
         _each(dict.fromkeys(delays, 0.0), table, "late")  # their columns exist
         try:
             table = advance_channels(table, delays)
-        except ValueError:  # the columns exist and the delays are numbers
-            raise LogError(
-                f"late: no recording is longer than the delays {dict(remedies.late)} in s, so "
-                "that no row is left."
-            ) from None
+        except ValueError as error:
+            raise LogError(f"late: {error}") from error
         told = ", ".join(f"{name} by {_in_words(*both)}" for name, both in delays.items())
         notes.append(
             f"late: {told} removed; {before - len(table)} of {before} rows at the ends of "

@@ -127,7 +127,7 @@ def _parallel(robot: Robot) -> Iterator[tuple[int, int]]:
 
 
 def _orders(fits: Fits, reading: Reading) -> Iterator[Change]:
-    """Orders of the columns: two exchanged, by name, backwards, one further."""
+    """Orders of the columns: two exchanged, by name, backwards, one further, branches exchanged."""
     n = fits.n_joints
     for name in ("order", "torque_order"):
         now = list(getattr(reading, name) or range(n))
@@ -140,6 +140,7 @@ def _orders(fits: Fits, reading: Reading) -> Iterator[Change]:
             by_name = sorted(range(n), key=lambda j: fits.robot.joint_names[j])
             tried += [[by_name.index(j) for j in range(n)], list(range(n))[::-1]]
             tried += [list(np.roll(range(n), k)) for k in (1, -1)]  # a column was lost or added
+            tried += _exchanged_branches(fits.robot)
         for order in tried:
             wanted = None if order == list(range(n)) else tuple(map(int, order))
             moved = tuple(j for j in range(n) if order[j] != j)
@@ -151,6 +152,25 @@ def _orders(fits: Fits, reading: Reading) -> Iterator[Change]:
                 yield Change(
                     "motion_order", moved, replace(reading, order=wanted, torque_order=own)
                 )
+
+
+def _exchanged_branches(robot: Robot) -> list[list[int]]:
+    """Orders in which two branches of several joints, such as both arms, are exchanged."""
+    parents = robot.tree.parents
+    if len(parents) != robot.n_joints:
+        return []  # bodies that mimic others have no columns of their own
+    below: dict[int, list[int]] = {j: [j] for j in range(robot.n_joints)}
+    for j in reversed(range(robot.n_joints)):
+        if parents[j] >= 0:
+            below[parents[j]] += below[j]
+    orders = []
+    for a, b in combinations(range(robot.n_joints), 2):
+        if parents[a] == parents[b] and len(below[a]) == len(below[b]) > 1:
+            order = list(range(robot.n_joints))
+            for one, other in zip(sorted(below[a]), sorted(below[b]), strict=True):
+                order[one], order[other] = other, one
+            orders.append(order)
+    return orders
 
 
 def _gravities(fits: Fits, reading: Reading, here: Outcome) -> Iterator[Change]:

@@ -395,6 +395,26 @@ class Fits:
 
         return self._of_torque.get("identified", reading, outcome)
 
+    def with_a_spring(self, joint: int) -> Outcome:
+        """Fit with identified bodies and any slow function of one position on its joint, as it is.
+
+        Parameters
+        ----------
+        joint : int
+            Joint, from 0.
+        """
+
+        def outcome() -> Outcome:
+            joints, designs, places, targets = self._designs(Reading())
+            at, use = joints.index(joint), self.moving[:, joint]
+            lines = self.average(lines_between(self.signals.q[:, joint]))[use]
+            new = 1 + max(int(place.max()) for place in places) + np.arange(lines.shape[1])
+            designs[at] = np.hstack([designs[at], lines])
+            places[at] = np.append(places[at], new)
+            return Outcome.of(self.n_joints, joints, fit_together(designs, places, targets))
+
+        return self._of_torque.get("spring", joint, outcome, self.n_joints)
+
     def predicted_without(
         self, parts: Iterable[NDArray[np.bool_]]
     ) -> Iterator[dict[int, tuple[Array, float]]]:

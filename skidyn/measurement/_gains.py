@@ -173,6 +173,18 @@ def scale_gain(fits: Fits, k: int, gain: float) -> float:
     return float(change.sum())
 
 
+def spring_gain(fits: Fits, k: int) -> float:
+    """Log-likelihood gain of any slow function of its position on a joint, beside its bodies.
+
+    A spring or a counterweight that is missing changes a torque as another scale does. The gain is
+    that without the penalty for its numbers (Schwarz 1978).
+    """
+    there, here = fits.with_a_spring(k), fits.identified(Reading())
+    numbers = len(there.fits[k].coefficients) - len(here.fits[k].coefficients)
+    rows = float(fits.moving[:, k].sum()) / there.inflation_of(k)
+    return float(there.gained_over(here) - 0.5 * numbers * np.log(max(rows, 2.0)))
+
+
 def joint_gain(fits: Fits, k: int, gain: float) -> tuple[float, float]:
     """Scale of one torque at which identified bodies, which all joints share, explain it best.
 

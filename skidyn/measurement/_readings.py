@@ -60,6 +60,9 @@ NEAR, SWEEPS = np.deg2rad(1.0), 3
 OTHER_BODIES = "bodies that differ from the description"
 #: Rounds of the fits for ranking, and number of changes that are examined in detail.
 SCREENED, FINALISTS = 1, 12
+#: Fewest recordings of which a share may contradict a zero, this share, and degrees of freedom of
+#: the law of residuals.
+FEW, MOST_AGAINST, LAW = 3, 0.3, 4.0
 #: Angles of every joint that are tried beside loads.
 ANGLES = 3
 
@@ -161,8 +164,24 @@ def _judged(fits: Fits, reading: Reading, here: Outcome) -> list[Change]:
         for c in judged
         if c.gain >= WEAKEST and c.drop >= LEAST_DROP and _all_gain(fits, c, reading, here)
     ]
+    judged = [c for c in judged if c.kind != "zero" or _in_most_recordings(fits, c, here)]
     judged = _but_for_tilt(fits, reading, judged)
     return sorted(judged, key=lambda c: -round(c.gain, 1))
+
+
+def _in_most_recordings(fits: Fits, zero: Change, here: Outcome) -> bool:
+    """Whether a zero explains most recordings better, as one of the encoder does.
+
+    A base that is tilted in some recordings, or a load of these, is like a zero in them alone.
+    """
+    there = fits.nominal(zero.reading)
+    names, place = np.unique(fits.recording, return_inverse=True)
+    gains = np.zeros(len(names))
+    for k in set(here.fits) & set(there.fits):
+        use, scale = fits.moving[:, k], there.scale[k]
+        size = [np.log1p((o.residual[k] / scale) ** 2 / LAW) for o in (here, there)]
+        gains += np.bincount(place[use], size[0] - size[1], len(names))
+    return len(names) < FEW or bool(np.mean(gains < 0) < MOST_AGAINST)
 
 
 def _but_for_tilt(fits: Fits, reading: Reading, judged: list[Change]) -> list[Change]:

@@ -19,6 +19,7 @@ from skidyn.measurement._gains import (
     known_gains,
     refined_scales,
     scale_gain,
+    spring_gain,
 )
 from skidyn.measurement._joint_gravity import without_gravity
 from skidyn.measurement._measurement import Measurement
@@ -244,6 +245,8 @@ def _at_own_scale(
         own, gained = joint_gain(fits.loaded(), k, gain)
         wrong = not USUAL[0] <= gain <= USUAL[1] and k in known
         sure = gained > (LEAST if wrong else SURE) and not low <= own <= high
+        if gained > 0 and spring_gain(fits.loaded(), k) > gained:
+            continue  # a spring or a counterweight, and no scale
         far_off = (scale_gain(fits.loaded(), k, times * own) for times in (0.25, 4.0))
         if sure and gained - max(far_off) > LEAST:
             found[k] = own

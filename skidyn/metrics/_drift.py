@@ -122,7 +122,14 @@ def drift(
 
     true, known = np.asarray(y, float), np.asarray(y_reference, float)
     if folds is None:
-        folds = list(TrajectoryKFold(n_splits=4).split(X_reference, known))
+        try:
+            folds = list(TrajectoryKFold(n_splits=4).split(X_reference, known))
+        except ValueError as few:
+            raise SkidynError(
+                f"the reference cannot be cut into the four folds of whole trajectories that are "
+                f"held out by default ({few}); give folds=, a list of pairs of training and test "
+                "rows"
+            ) from few
     told = np.full(known.shape, np.nan)
     for train, test in folds:
         fitted = clone(model).fit(_rows(X_reference, train), known[train])

@@ -179,10 +179,21 @@ class PhaseKFold(BaseCrossValidator):
         ------
         train, test : ndarray of int
             Row numbers.
+
+        Raises
+        ------
+        ValueError
+            Fewer than 2 folds, a period that is not positive, or a fold without rows.
         """
+        if self.n_splits < 2:
+            raise ValueError(
+                f"n_splits={self.n_splits}; at least 2 parts of the period are needed."
+            )
         time = np.asarray(column_of(X, self.time, "time"), dtype=float)
         start = time.min()
         period = (np.nextafter(time.max(), np.inf) - start) if self.period is None else self.period
+        if not period > 0:
+            raise ValueError(f"period={period:g} s; a time above 0 is expected.")
         phase = np.mod(time - start, period)
         width = period / self.n_splits
         part = np.minimum((phase / width).astype(int), self.n_splits - 1)
@@ -192,6 +203,13 @@ class PhaseKFold(BaseCrossValidator):
             before = np.mod(k * width - phase, period)
             after = np.mod(phase - (k + 1) * width, period)
             train = ~test & (np.minimum(before, after) >= self.guard)
+            if not (train.any() and test.any()):
+                lacking = "test" if train.any() else "training"
+                raise ValueError(
+                    f"fold {k + 1} of {self.n_splits} has no {lacking} rows: the log lasts "
+                    f"{np.ptp(time):.4g} s, with period={period:.4g} s and guard={self.guard:g} s. "
+                    "Check that all are in s, or use fewer folds or a shorter guard."
+                )
             yield np.flatnonzero(train), np.flatnonzero(test)
 
 

@@ -240,12 +240,8 @@ def advance_channels(
             columns[name][rows] = _read_at(own, columns[name][rows], later)
             keep[rows] &= (later >= own[0]) & (later <= own[-1])
     if not keep.any():
-        raise ValueError(
-            "no row is left: the delays are longer than every run of samples without a gap. Delays "
-            "are in s; those given are "
-            + ", ".join(f"{name}: {lag:g} s" for name, (lag, _) in shifts.items())
-            + "."
-        )
+        told = {name: lag for name, (lag, _) in shifts.items()}
+        raise ValueError(f"no recording is longer than the delays {told} in s, so no row is left.")
     return frame.assign(**columns)[keep].reset_index(drop=True)
 
 

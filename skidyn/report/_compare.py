@@ -276,9 +276,9 @@ def _headline(report: dict[str, Any]) -> str:
     for name in names:
         own = [row for row in report["findings"] if row["in"] == [name]]
         if own:
-            parts.append(f"only in “{name}”: {_brief(own)}")
+            parts.append(f"missing only in “{name}”: {_brief(own)}")
     if parts:
-        return "; ".join(parts).replace("only", "Only", 1)
+        return "; ".join(parts).replace("missing", "Missing", 1)
     mean = _mean_ratio(report)
     if report["same_log"] and mean is not None and abs(mean - 1) >= ALIKE:
         best = names[0] if mean > 1 else names[1]

@@ -59,8 +59,10 @@ def simulate(
     Raises
     ------
     SkidynError
-        The log has no time, there is neither torque nor controller, an effect cannot be simulated,
-        or the inertia of the model is not positive definite.
+        The model is not fitted or not a physical one, the log has no time, there is neither torque
+        nor controller, y has other rows than X or its columns another order, the step is not
+        positive, an effect cannot be simulated, or the inertia of the model is not positive
+        definite.
 
     See Also
     --------
@@ -78,6 +80,8 @@ def simulate(
     >>> bool((motion["q1"] - log.X["q1"][run]).abs().max() < 0.1)
     True
     """
+    if not step > 0:
+        raise SkidynError(f"step={step!r}; a time above 0 s is expected")
     task = read_task(model, X, y, controller, horizon)
     if engine == "mujoco":
         from skidyn.simulation._mujoco import run_mujoco

@@ -46,19 +46,6 @@ def test_joints_that_get_worse_are_marked_and_the_file_is_named(diagnosed, tmp_p
     assert all(line.endswith("worse") == (change > 2) for line, change in changes.items())
 
 
-def test_what_cannot_be_added_is_refused(diagnosed, capsys):
-    words = ["add", "--from", str(diagnosed / "report.json"), "--effect"]
-    for effect, told in {
-        "torque_ripple": "needs its shape parameter N",
-        "temperature_friction": "needs joint temperatures",
-        "coupling_spring": "--joints 1,2",
-        "viscous": "already has viscous on joints 1 and 2",
-    }.items():
-        joints = ["--joints", "1"] if effect == "coupling_spring" else []
-        assert cli.main([*words, effect, *joints]) == cli.BAD_INPUT
-        assert told in capsys.readouterr().err
-
-
 @pytest.fixture(scope="module")
 def loaded(work, tmp_path_factory):
     """A report of a log in which some recordings carry a load."""
@@ -161,3 +148,17 @@ def test_a_damaged_setting_is_refused(weak_servo, capsys):
     words = ["add", "--from", str(weak_servo / "damaged.json"), "--effect", "servo_current"]
     assert cli.main(words) == cli.BAD_INPUT
     assert "it must come from skidyn diagnose" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("viscous",), "has viscous on these joints already"),
+        (("torque_ripple", "--joints", "2"), "shape parameter N"),
+        (("coupling_spring", "--joints", "1"), "--joints 1,2"),
+        (("temperature_friction",), "needs joint temperatures"),
+    ],
+)
+def test_what_cannot_be_added_is_told_in_a_line(diagnosed, capsys, words, told):
+    assert cli.main(["add", "--from", str(diagnosed / "report.json"), "--effect", *words]) == 2
+    assert told in capsys.readouterr().err

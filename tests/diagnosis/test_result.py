@@ -30,7 +30,7 @@ def test_what_cannot_be_added_is_refused(missing):
         missing.add("spring", joints=[7])
     with pytest.raises(EffectError, match="no formula was proposed"):
         missing.add("formula")
-    with pytest.raises(EffectError, match="already has viscous on joints 1 and 2"):
+    with pytest.raises(EffectError, match="has viscous on these joints already: joints 1 and 2"):
         missing.add("viscous")
     with pytest.raises(EffectError, match="temperature_friction needs joint temperatures"):
         missing.add("temperature_friction")

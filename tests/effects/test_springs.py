@@ -2,9 +2,12 @@
 """Columns of springs and stops against their formulas."""
 
 import numpy as np
+import pytest
 
-from skidyn.datasets import load_scara
+from skidyn.datasets import load_planar_arm, load_scara, make_hidden_effect_log
+from skidyn.diagnosis import diagnose
 from skidyn.effects import Signals, Term, get_effect
+from skidyn.identification import RBDRegressor
 
 
 def test_springs(signals, columns_of):
@@ -171,3 +174,22 @@ def test_what_stops_a_vertical_slide_on_its_way_down_is_usually_a_contact():
     assert usually(slide, q_lim=0.0, side=-down) is None
     assert usually(slide, q_lim=0.1, q_low=-0.1, side=down) is None
     assert usually(0, q_lim=0.0, side=down) is None
+
+
+def test_a_stop_may_be_touched_a_third_of_the_time():
+    log = make_hidden_effect_log(load_planar_arm(), None, duration=6.0, random_state=1)
+    q = log.X["q2"].to_numpy()
+    limit = np.quantile(q, 0.65)
+    y = log.y + np.eye(2)[1] * 4.0 * np.maximum(0.0, q - limit)[:, None]
+    (finding,) = diagnose(RBDRegressor(log.robot), log.X, y).findings
+    assert (finding.kind, finding.joints) == ("end_stop", (2,))
+    assert finding.parameters["q_lim"]["value"] == pytest.approx(limit, abs=0.01)
+    assert finding.parameters["k"]["value"] == pytest.approx(4.0, rel=0.02)
+
+
+def test_pieces_of_a_spring_have_names_and_units_of_their_own():
+    effect = get_effect("nonlinear_spring")
+    names = [c.name for c in effect.coefficients_of({"low": -0.2, "high": 0.3})]
+    assert names == ["k_between", "k_below", "k_above", "tau0"]
+    assert {effect.units(True)[name] for name in names[:3]} == {"N/m"}
+    assert "k_" in effect.formula_of({"low": 0.0, "high": 1.0}) != effect.formula_of({})

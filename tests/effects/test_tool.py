@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.datasets import make_hidden_effect_log
+from skidyn.datasets import load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.effects import Signals, Term, get_effect
 from skidyn.identification import RBDRegressor
@@ -232,3 +232,15 @@ def test_a_weight_on_a_point_that_turns_with_the_tool_is_a_payload_and_no_force(
     assert usually([0.1, 0.0, -4.0]) == "payload"
     assert usually([0.1, 0.0, 4.0]) is usually([2.0, 0.0, -4.0]) is None
     assert usually([0.1, 0.0, -4.0], on_tool=1.0) is None
+
+
+@pytest.mark.slow
+def test_a_force_in_all_recordings_is_named():
+    """The bodies cannot take it in, unlike a payload."""
+    log = make_hidden_effect_log(load_ur5(), None, n_trajectories=6, duration=5.0, random_state=1)
+    q = log.X[[f"q{k + 1}" for k in range(6)]].to_numpy()
+    pull = np.einsum("naj,a->nj", log.robot.jacobian(q)[:, :3], [6.0, 9.0, 0.0])
+    (finding,) = diagnose(RBDRegressor(log.robot), log.X, log.y - pull).findings
+    assert (finding.kind, finding.trajectories) == ("external_wrench", None)
+    force = [finding.parameters[f"force_{axis}"]["value"] for axis in "xy"]
+    assert force == pytest.approx([6.0, 9.0], rel=0.02)

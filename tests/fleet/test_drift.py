@@ -41,3 +41,11 @@ def test_too_short_histories_are_refused():
         monitor_drift(make_history(0, n=20))
     with pytest.raises(SkidynError, match="at least 8 reference"):
         monitor_drift(make_history(0), reference=3)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"), [({"false_alarm": 2}, "probability"), ({"dates": {1: "a"}}, "dates lacks")]
+)
+def test_options_that_cannot_be_are_refused(options, told):
+    with pytest.raises(SkidynError, match=told):
+        monitor_drift(make_history(0), **options)

@@ -60,3 +60,18 @@ def test_autoregression_finds_the_process_and_beats_persistence():
 def test_the_past_of_every_output_must_be_there():
     with pytest.raises(ValueError, match="the past of 2 signals and y has 1"):
         PersistenceRegressor().fit(np.zeros((5, 2)), np.zeros(5))
+
+
+@pytest.mark.parametrize(
+    ("signal", "keys", "told"),
+    [
+        ([], {}, "no samples"),
+        ([1.0, np.nan, 2.0], {}, "not finite in row 1"),
+        (np.arange(9.0), {"trajectory": [0, 0, 0]}, "one value for each of the 9 samples"),
+        (np.arange(9.0), {"time": -np.arange(9.0)}, "not in the order of time"),
+        (np.arange(8.0), {"trajectory": [0, 1] * 4}, "right before it"),
+    ],
+)
+def test_rows_that_cannot_be_forecast_are_named(signal, keys, told):
+    with pytest.raises(ValueError, match=told):
+        forecast_table(signal, **keys)

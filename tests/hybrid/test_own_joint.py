@@ -73,3 +73,15 @@ def test_rows_have_weights():
     weight = np.r_[np.zeros(60), np.ones(60)]
     model = OwnJointRegressor(Ridge(), presliding=()).fit(X, y, sample_weight=weight)
     np.testing.assert_allclose(model.predict(X)[60:], y[60:], atol=0.1)
+
+
+def test_the_torque_of_one_joint_of_several_needs_its_name():
+    rng = np.random.default_rng(0)
+    X = pd.DataFrame(
+        rng.normal(size=(50, 6)), columns=[f"{s}{k}" for s in ("q", "dq", "ddq") for k in (1, 2)]
+    )
+    with pytest.raises(ValueError, match="numbers do not tell whose it is"):
+        OwnJointRegressor(Ridge()).fit(X, X["q2"])
+    named = X.rename(columns=lambda name: name[:-1] + {"1": "_base", "2": "_tip"}[name[-1]])
+    own = OwnJointRegressor(Ridge(), joint_names=["tip"]).fit(named, X["q2"])
+    assert own.score(named, X["q2"]) > 0.99

@@ -332,3 +332,48 @@ def test_millimetres_and_kilometres(reference, length):
     np.testing.assert_allclose(
         model.predict(HIDDEN.X) / length**2, reference.predict(HIDDEN.X), rtol=1e-6, atol=1e-6
     )
+
+
+def test_only_ratios_of_weights_count_and_trajectories_without_weight_do_not():
+    log = make_hidden_effect_log(load_planar_arm(), "stribeck", n_trajectories=6, duration=3.0)
+    model = RBDRegressor(log.robot)
+    n = len(log.X)
+    one, less = (model.fit(log.X, log.y, sample_weight=np.full(n, w)).coef_ for w in (1.0, 1.0 / n))
+    np.testing.assert_allclose(less, one, rtol=1e-9)
+    kept = (log.X["trajectory"] <= 3).to_numpy()
+    weighted = model.fit(log.X, log.y, sample_weight=kept.astype(float)).coef_
+    np.testing.assert_allclose(weighted, model.fit(log.X[kept], log.y[kept]).coef_, rtol=1e-9)
+
+
+def test_motion_without_what_a_fit_needs_is_refused():
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+    X, y, robot = log.X, log.y, log.robot
+    with pytest.raises(ColumnError, match="smooth=True"):
+        RBDRegressor(robot, smooth=True).fit(X.drop(columns=["time", "trajectory"]), y)
+    with pytest.raises(ColumnError, match="another order than the joints"):
+        RBDRegressor(robot).fit(X, log.frame[["tau2", "tau1"]])
+    with pytest.raises(ColumnError, match="equal to those of the row before"):
+        RBDRegressor(robot).fit(X.assign(time=0.0), y)
+    with pytest.raises(ColumnError, match="column 'dq2' of X is NaN in row 7"):
+        RBDRegressor(robot).fit(X.assign(dq2=X["dq2"].where(X.index != 7)), y)
+    bare = X.drop(columns=["ddq1", "ddq2"], errors="ignore")
+    fitted = RBDRegressor(robot).fit(bare, y)
+    with pytest.raises(ColumnError, match="no neighbour in time"):
+        fitted.predict(bare[:1])
+
+
+@pytest.mark.parametrize(
+    ("effect", "told"),
+    [("torque_ripple", "shape parameter N"), ("temperature_friction", "temp1")],
+)
+def test_effects_that_a_fit_cannot_search_or_see_are_refused(effect, told):
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+    with pytest.raises(ValueError, match=told):
+        RBDRegressor(log.robot, ("viscous", effect)).fit(log.X, log.y)
+
+
+def test_effects_may_not_change_between_parts():
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=2.0)
+    model = RBDRegressor(log.robot).partial_fit(log.X, log.y).set_params(effects=("viscous",))
+    with pytest.raises(ValueError, match="were changed after its first part"):
+        model.partial_fit(log.X, log.y)

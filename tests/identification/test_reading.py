@@ -152,9 +152,12 @@ def test_few_rows_bring_no_bare_warnings_of_numpy():
 @pytest.mark.parametrize(
     ("time", "told"),
     [
-        (np.zeros(len(FULL)), "'time' of X, the time in s, is 0 in all"),
+        (
+            np.zeros(len(FULL)),
+            "'time' of X are equal to those of the row before in all .* rows of trajectory 1, 0 s",
+        ),
         (np.float32(FULL["time"] + 1.7e9), "float32 cannot hold seconds since 1970"),
-        (np.float32(FULL["time"] + 1e6), "repeats its value of the row before"),
+        (np.float32(FULL["time"] + 1e6), "in at least 8.% of the rows"),
     ],
     ids=["constant", "since 1970", "coarse"],
 )

@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skidyn.datasets import load_panda, load_planar_arm, load_ur5
+from skidyn.datasets import load_panda, load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.identification import RBDRegressor
 from skidyn.robots import find_base_parameters
 
@@ -115,3 +115,20 @@ def test_without_trust_in_the_urdf_it_is_least_squares():
     assert rms(held - truth) < rms(plain - truth)
     with pytest.raises(ValueError, match="prior_std=inf leaves estimator='entropic' without"):
         RBDRegressor(robot, estimator="entropic", prior_std=np.inf).fit(X, y)
+
+
+@pytest.mark.parametrize("hidden", [lambda q: 60.0 * q, lambda q: 40.0 * np.sin(2.0 * q)])
+def test_a_strong_spring_does_not_hold_the_model_to_the_description(hidden):
+    """Clear data of some directions is used, however far the spring moves others from the URDF."""
+    log, new = (
+        make_hidden_effect_log(load_ur5(), None, n_trajectories=7, random_state=seed)
+        for seed in (3, 4)
+    )
+    y, wanted = (
+        some.y + np.eye(6)[1] * hidden(some.X["q2"].to_numpy())[:, None] for some in (log, new)
+    )
+    trusting, free = (
+        RBDRegressor(log.robot, prior_std=prior).fit(log.X, y).predict(new.X) - wanted
+        for prior in (None, np.inf)
+    )
+    assert rms(trusting[:, 1]) < 1.1 * rms(free[:, 1])

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from skidyn.datasets import (
+    load_planar_arm,
     load_scara,
     load_ur5,
     make_hidden_effect_log,
@@ -79,3 +80,10 @@ def test_a_last_joint_with_friction_alone_is_in_the_unit_of_the_one_before(wrist
     alone = check_log(frame.assign(tau6=1e3 * frame["tau6"]), robot).checks
     (told,) = [s for s in alone if s.check == "torque_scale"]
     assert told.certainty == "noted" and told.joints == (6,)
+
+
+def test_a_spring_is_no_other_scale():
+    robot = load_planar_arm().with_gravity((0, 0, -9.81))
+    log = make_hidden_effect_log(robot, None, n_trajectories=6, duration=6.0, random_state=4)
+    log.frame["tau2"] += 8.0 * log.frame["q2"]
+    assert "torque_scale" not in {told.check for told in check_log(log.frame, robot).checks}

@@ -47,3 +47,8 @@ def test_a_joint_that_never_moves_is_told(recording):
 
 def test_drift_is_a_result_by_itself():
     assert Drift(np.array([2.0]), np.array([3.0])).ratio.tolist() == [1.5]
+
+
+def test_a_reference_of_few_trajectories_needs_folds(recording):
+    with pytest.raises(SkidynError, match="give folds="):
+        drift(LinearRegression(), *recording, *recording)

@@ -49,3 +49,18 @@ def test_phase_folds_hold_out_every_repetition_with_a_guard():
         assert (time[test] > 10).sum() == pytest.approx(len(test) / 2, abs=2)
         tested.append(test)
     np.testing.assert_array_equal(np.sort(np.concatenate(tested)), np.arange(len(time)))
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"period": 200.0}, "has no training rows"),
+        ({"period": -2.0}, "above 0"),
+        ({"period": 2.0, "guard": 5.0}, "has no training rows"),
+        ({"n_splits": 1}, "at least 2"),
+    ],
+)
+def test_phases_without_rows_are_refused(options, told):
+    X = pd.DataFrame({"time": np.arange(0, 4, 0.01), "q1": 0.0})
+    with pytest.raises(ValueError, match=told):
+        list(PhaseKFold(**options).split(X))

@@ -161,3 +161,10 @@ def test_joint_with_another_drive_gain_is_named(runs, found):
     wrong = identify_payload(log.robot, loaded, unloaded, effects=FRICTION)
     assert "estimated from single joints" in wrong.text
     assert any("drive gain" in note and "Joint" in note for note in wrong.notes)
+
+
+def test_loads_that_are_lighter_than_none_are_exchanged(runs):
+    log = runs[0]
+    loaded = log.frame["trajectory"].isin(log.parameters["trajectories"])
+    with pytest.raises(SkidynError, match="kg less at"):
+        identify_payload(log.robot, log.frame[~loaded], log.frame[loaded])

@@ -66,3 +66,11 @@ def test_messages(log):
         estimate_delay(log["q1"][:50], log["tau1"][:50], rate=250.0)
     with pytest.raises(ValueError, match="has no i1"):
         advance_channels(log, {"i1": 0.1})
+
+
+@pytest.mark.parametrize(
+    ("delay", "told"), [(np.nan, "finite number of s"), (100.0, "no recording is longer")]
+)
+def test_an_impossible_delay_is_refused(log, delay, told):
+    with pytest.raises(ValueError, match=told):
+        advance_channels(log, {"tau1": delay})

@@ -24,3 +24,8 @@ def test_a_learner_behind_it_cannot_memorise_the_log():
     pipeline.fit(X, 2 * X["q1"])
     renumbered = X.assign(trajectory=[9, 9, 9, 9], time=[5.0, 5.1, 5.2, 5.3])
     np.testing.assert_allclose(pipeline.predict(renumbered), 2 * X["q1"], atol=1e-6)
+
+
+def test_torque_is_no_feature():
+    table = pd.DataFrame(np.zeros((4, 4)), columns=["time", "q_elbow", "dq_elbow", "tau_elbow"])
+    assert DropKeys().fit(table).get_feature_names_out().tolist() == ["q_elbow", "dq_elbow"]

@@ -57,3 +57,18 @@ def test_scaler_inverts(log):
         scaled = scaler.fit_transform(log)
         np.testing.assert_array_equal(scaled[:, :2], log[["trajectory", "time"]])
         np.testing.assert_allclose(scaler.inverse_transform(scaled), log)
+
+
+def test_cutoff_is_one_in_hz_at_every_rate():
+    def wave(rate):
+        time = np.arange(0, 20, 1 / rate)
+        return pd.DataFrame({"time": time, "q1": np.sin(2 * np.pi * 8 * time)})
+
+    fitted = ButterworthFilter(10.0).fit(wave(100.0))
+    kept = {
+        rate: np.ptp(fitted.transform(wave(rate))[len(wave(rate)) // 4 :, 1])
+        for rate in (100, 1000)
+    }
+    assert kept[1000] == pytest.approx(kept[100], rel=0.05)
+    with pytest.raises(ValueError, match="by the time column of X it is 100 Hz"):
+        ButterworthFilter(10.0, rate=1000.0).fit(wave(100.0))

@@ -30,7 +30,7 @@ def test_two_models_of_one_log_share_their_rows(fakes):
     assert set(table["columns"]) == {"measured", "first", "second"}
     ratio = summary["report"]["ratios"][0]
     assert ratio["low"] < ratio["ratio"] < ratio["high"]
-    assert "Only in “usual”: Dahl friction on joints 1 and 2" in summary["headline"]
+    assert "Missing only in “usual”: Dahl friction on joints 1 and 2" in summary["headline"]
 
 
 def test_rivals_are_one_finding(fakes):
@@ -47,7 +47,7 @@ def test_what_is_uncertain_in_both_is_only_possible(fakes):
     first.findings = [replace(f, confidence=0.3) for f in first.findings]
     second.findings = []
     summary = summarize_comparison(first, second, names=("usual", "whole"))
-    assert "Only in “usual”: possibly Dahl friction" in summary["headline"]
+    assert "Missing only in “usual”: possibly Dahl friction" in summary["headline"]
     second.findings = first.findings
     summary = summarize_comparison(first, second)
     assert "The same effects may be missing in both" in summary["headline"]

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
+from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor
 from skidyn.simulation import simulate
 
@@ -32,3 +33,17 @@ def test_effect_that_is_there_improves_the_motion(kind):
         for out in (simulate(m, log.X[~train], log.y[~train], horizon=1.0) for m in (plain, whole))
     ]
     assert errors[1] < 0.8 * errors[0]
+
+
+def test_what_cannot_be_simulated_is_refused():
+    log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=1, duration=2.0)
+    model = RBDRegressor(log.robot)
+    with pytest.raises(SkidynError, match="no fitted robot"):
+        simulate(model, log.X, log.y)
+    model.fit(log.X, log.y)
+    with pytest.raises(SkidynError, match="y has 199 rows and X 200"):
+        simulate(model, log.X, log.y[:199])
+    with pytest.raises(SkidynError, match="step=0"):
+        simulate(model, log.X, log.y, step=0)
+    with pytest.raises(SkidynError, match="another order than the joints"):
+        simulate(model, log.X, log.frame[["tau2", "tau1"]])

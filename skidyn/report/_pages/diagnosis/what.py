@@ -12,7 +12,7 @@ from skidyn.report._parameters import parameter_rows
 from skidyn.report._picture import Canvas, Picture, Summary
 
 if TYPE_CHECKING:
-    from skidyn.diagnosis import Diagnosis
+    from skidyn.diagnosis import Diagnosis, Finding
 
 
 class What(Picture):
@@ -29,7 +29,7 @@ class What(Picture):
                 **finding.to_dict(),
                 "title": finding.title,
                 "code": finding.code,
-                "formula": "" if finding.kind == "unknown" else get_effect(finding.kind).formula,
+                "formula": _formula(finding),
                 "proposals": [
                     {"joint": u.joint, "text": u.proposal.text}
                     for u in subject.unknowns
@@ -53,3 +53,10 @@ class What(Picture):
             rows = parameter_rows(finding)
             cards.append({**finding, "line": line, "charts": charts, "rows": rows})
         return {"cards": cards} if cards else None
+
+
+def _formula(finding: Finding) -> str:
+    """The formula of a finding in its form, in LaTeX; none of an unknown torque."""
+    if finding.kind == "unknown" or not finding.terms:
+        return ""
+    return get_effect(finding.kind).formula_of(finding.terms[0].shape)
