@@ -51,7 +51,6 @@ def read_inputs(
     options: argparse.Namespace, *, check: bool = True
 ) -> tuple[Robot, RBDRegressor, pd.DataFrame, Any, Controller | None]:
     """Robot, model, log, torques, and the controller of the options, which may determine these."""
-    from skidyn._persistence import load_model
     from skidyn.identification import RBDRegressor
 
     robot = read_robot(options)
@@ -61,10 +60,22 @@ def read_inputs(
 
         tau = servo_torque(controller, frame)
     if options.model.endswith(".skops"):
-        return robot, load_model(options.model), frame, tau, controller
+        return robot, stored_model(options.model), frame, tau, controller
     effects = effects_option(options.model)
     model = RBDRegressor(robot, effects, "nominal" if options.nominal else "identified")
     return robot, model, frame, tau, controller
+
+
+def stored_model(path: str) -> Any:
+    """The model in a file."""
+    from skidyn._persistence import load_model
+
+    if not Path(path).is_file():
+        raise SkidynError(
+            f"no file {path}; --model must name a model that skidyn.save_model or skidyn explore "
+            "has stored, such as model.skops"
+        )
+    return load_model(path)
 
 
 def find_suspicions(

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from skidyn._commands._arguments import Input, Output, command, with_controller, with_joints
-from skidyn._commands._input import embedded_robot, joint_numbers, read_driven
+from skidyn._commands._input import embedded_robot, joint_numbers, read_driven, stored_model
 from skidyn._commands._output import print_json, working, write_table
 from skidyn._exceptions import SkidynError
 from skidyn._text import joints_told
@@ -109,13 +109,13 @@ def run(options: argparse.Namespace) -> None:
 
 def _along(options: argparse.Namespace) -> None:
     """Simulate a fitted model along a log."""
-    from skidyn import load_model
+    from skidyn.forward import robot_of
     from skidyn.simulation import simulate, simulation_errors
 
     if options.out is not None and Path(options.out).suffix not in (".csv", ".parquet"):
         raise SkidynError(f"{options.out}: the motion to write must end in .csv or .parquet")
-    model = load_model(options.model)
-    robot = model.robot_
+    model = stored_model(options.model)
+    robot = robot_of(model)
     frame, tau, controller = read_driven(options, robot)
     said: dict[str, Any] = {"horizon": options.horizon or None, "engine": options.engine}
     if controller is not None:

@@ -11,6 +11,7 @@ from skidyn.forward._run import (
     commanded as commanded,
     read_task as read_task,
     references as references,
+    robot_of as robot_of,
     run as run,
 )
 from skidyn.forward._windows import make_windows as make_windows

@@ -53,16 +53,22 @@ class Task:
     rate: Array | None = None
 
 
-def read_task(
-    model: Any, X: Any, y: Any, controller: Controller | None, horizon: float | None
-) -> Task:
-    """Signals, pieces and drive of a log."""
+def robot_of(model: Any) -> Robot:
+    """Robot of a fitted physical model; a SkidynError for other models."""
     if not hasattr(model, "robot_"):
         raise SkidynError(
             f"{type(model).__name__} has no fitted robot: give a fitted RBDRegressor; the physical "
             "part of a hybrid model is its physics_"
         )
-    n = model.robot_.n_joints
+    robot: Robot = model.robot_
+    return robot
+
+
+def read_task(
+    model: Any, X: Any, y: Any, controller: Controller | None, horizon: float | None
+) -> Task:
+    """Signals, pieces and drive of a log."""
+    n = robot_of(model).n_joints
     if (y is None) == (controller is None):
         raise SkidynError("give either the torque y or a controller, which follows q_ref1..")
     signals = motion_of(model, X)

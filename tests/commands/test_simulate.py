@@ -40,7 +40,10 @@ def test_an_interrupted_run_leaves_the_previous_output_whole(tmp_path, monkeypat
 
 def test_simulate_runs_a_fitted_model_along_a_log(capsys, tmp_path):
     pytest.importorskip("skops")
+    from sklearn.linear_model import Ridge
+
     from skidyn import save_model
+    from skidyn.hybrid import HybridRegressor
     from skidyn.identification import RBDRegressor
 
     log = make_hidden_effect_log(load_planar_arm(), None, n_trajectories=2, duration=3.0)
@@ -57,6 +60,11 @@ def test_simulate_runs_a_fitted_model_along_a_log(capsys, tmp_path):
     assert "q1" in (tmp_path / "motion.csv").read_text().splitlines()[0]
     assert cli.main(words[:3]) == 2
     assert "--log is missing" in capsys.readouterr().err
+    assert cli.main(["simulate", "--model", "nowhere", "--log", files[1]]) == 2
+    assert "no file nowhere; --model must name a model" in capsys.readouterr().err
+    save_model(tmp_path / "hybrid.skops", HybridRegressor(model, Ridge()).fit(log.X, log.y))
+    assert cli.main(["simulate", "--model", str(tmp_path / "hybrid.skops"), *words[3:]]) == 2
+    assert "HybridRegressor has no fitted robot" in capsys.readouterr().err
 
 
 @pytest.mark.slow
