@@ -247,12 +247,11 @@ def print_regimes(diagnosis: Diagnosis) -> None:
 
     print("error by joint and regime (N m, N for sliders)")
     width = max(len(name) for name in diagnosis.joint_names)
-    widths = [max(8, len(name) + 1) for name in diagnosis.regimes]  # seven fit into 80 columns
-    heads = zip(diagnosis.regimes, widths, strict=True)
-    print(f"  {'':{width}s}" + "".join(f"{head:>{w}s}" for head, w in heads))
-    for name, errors in zip(diagnosis.joint_names, diagnosis.error_map(), strict=True):
-        cells = ("-" if np.isnan(e) else f"{e:.3g}" for e in errors)
-        row = "".join(f"{cell:>{w}s}" for cell, w in zip(cells, widths, strict=True))
+    cells = [["-" if np.isnan(e) else digits(e) for e in own] for own in diagnosis.error_map()]
+    columns = zip(diagnosis.regimes, *cells, strict=True)
+    widths = [max(8, 1 + max(map(len, own))) for own in columns]  # seven fit into 80 columns
+    for name, own in zip(["", *diagnosis.joint_names], [diagnosis.regimes, *cells], strict=True):
+        row = "".join(f"{cell:>{w}s}" for cell, w in zip(own, widths, strict=True))
         print(f"  {name:{width}s}{row}")
     for failure in diagnosis.failures:
         print(f"  {failure.sentence}")

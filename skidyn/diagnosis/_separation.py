@@ -114,10 +114,13 @@ class SeparatingMotion:
         )
         if all(self.confirmed.values()):
             return text + " In simulated recordings of this motion both effects were recognised."
-        wrong = listed([k for k, right in self.confirmed.items() if not right])
+        wrong = [kind for kind, right in self.confirmed.items() if not right]
+        missed = f"{wrong[0]} was still not" if len(wrong) == 1 else "neither of the two was"
+        longer = 2 * self.time[-1]
         return (
-            f"{text} In a simulated recording with {wrong} as the truth the effect was still not "
-            "recognised."
+            f"{text} In a simulated recording with {listed(wrong, 'or')} as the truth, {missed} "
+            "recognised. Repeat the motion in several recordings, or design a longer one: "
+            f"--duration {longer:.0f} (in Python: duration={longer:.0f})."
         )
 
     def to_frame(self) -> Any:

@@ -474,7 +474,7 @@ def late_joints(found: Delay, least: float = ALONE) -> list[int]:
     for k, lag in enumerate(found.joints):
         others = np.delete(found.joints, k)
         sure = others[np.isfinite(others) & (np.delete(found.errors, k) < SMALLEST)]
-        if not np.isfinite(lag) or len(sure) < min(FEWEST_SURE, len(others)):
+        if not np.isfinite(lag) or len(sure) < max(1, min(FEWEST_SURE, len(others))):
             continue
         common = float(np.median(sure))
         apart = abs(lag - common) > max(APART, ERRORS * found.errors[k])

@@ -324,7 +324,7 @@ def _sentence(report: dict[str, Any]) -> str:
         several = len(report["ratios"]) > 1
         text += f"As given, {second} has {_change(mean, first)}{over if several else ''}. "
     shared = [row for row in report["findings"] if len(row["in"]) == 2]
-    return text + (f"Missing in both: {_brief(shared)}." if shared else "")
+    return (text + (f"Missing in both: {_brief(shared)}." if shared else "")).rstrip()
 
 
 def _change(ratio: float, first: str) -> str:

@@ -91,6 +91,9 @@ def test_compare_knows_joints_trajectories_and_regimes(capsys, run, arguments):
     }
     assert cli.main(["compare", *arguments]) == cli.DONE
     assert "reversal" in capsys.readouterr().out
+    assert cli.main(["compare", *arguments, "--gain", "tau=30000"]) == cli.DONE
+    heads, *rows = capsys.readouterr().out.partition("joint and regime")[2].splitlines()[1:4]
+    assert [len(row.split()) for row in rows] == [1 + len(heads.split())] * 2
 
 
 @pytest.mark.slow

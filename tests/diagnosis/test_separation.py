@@ -10,7 +10,12 @@ import numpy as np
 import pytest
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
-from skidyn.diagnosis import design_separating_motion, diagnose, findings_to_separate
+from skidyn.diagnosis import (
+    SeparatingMotion,
+    design_separating_motion,
+    diagnose,
+    findings_to_separate,
+)
 from skidyn.effects import Term
 from skidyn.exceptions import EffectError
 from skidyn.identification import RBDRegressor
@@ -38,6 +43,18 @@ def test_hysteresis_is_told_apart_by_a_motion_that_the_log_lacked(diagnosis, mot
     assert motion.gain > 3 * motion.gain_of_log
     assert motion.confirmed == {"maxwell_slip": True, "dahl": True}
     assert "both effects were recognised" in motion.sentence
+
+
+def test_what_is_still_not_recognised_is_named_with_what_to_do():
+    still = np.zeros((3, 1))
+    motion = SeparatingMotion(
+        "dahl", "stribeck", (1,), np.array([0.0, 10.0, 20.0]), still, still, still, 90.0, 3.0,
+        {"dahl": True, "stribeck": False},
+    )  # fmt: skip
+    assert "with stribeck as the truth, stribeck was still not recognised" in motion.sentence
+    assert "--duration 40" in motion.sentence
+    motion = replace(motion, confirmed={"dahl": False, "stribeck": False})
+    assert "dahl or stribeck as the truth, neither of the two was recognised" in motion.sentence
 
 
 @pytest.mark.slow

@@ -1,11 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Torque that is late in all joints or in one."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 from skidyn.datasets import load_scara, load_ur5, make_hidden_effect_log
 from skidyn.logs import check_log
+from skidyn.robots import Robot
+
+#: A robot of one joint.
+PENDULUM = """<robot name="one"><link name="base"/><link name="arm"><inertial>
+<origin xyz="0 0 0.3"/><mass value="2"/>
+<inertia ixx="0.05" iyy="0.05" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="swing" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" effort="40" velocity="4"/></joint></robot>"""
 
 
 def test_late_torque(recorded, told_of):
@@ -72,3 +82,11 @@ def test_a_clock_that_drifts_a_little_is_told_from_a_constant_lag():
     assert told.suspicion.startswith("the clock of the torque runs at a different rate")
     growth = float(told.remedy.option.partition("+")[2].removesuffix("*t"))
     assert growth == pytest.approx(3.9e-3, rel=0.05)
+
+
+def test_a_single_joint_brings_no_warnings_of_numpy():
+    one = Robot.from_urdf(PENDULUM)
+    log = make_hidden_effect_log(one, None, n_trajectories=4, duration=6.0, random_state=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        check_log(log.frame, one)

@@ -31,6 +31,7 @@ def test_two_models_of_one_log_share_their_rows(fakes):
     ratio = summary["report"]["ratios"][0]
     assert ratio["low"] < ratio["ratio"] < ratio["high"]
     assert "Missing only in “usual”: Dahl friction on joints 1 and 2" in summary["headline"]
+    assert summary["sentence"] == summary["sentence"].strip()
 
 
 def test_rivals_are_one_finding(fakes):
