@@ -125,6 +125,12 @@ class OwnJointRegressor(MetaEstimatorMixin, MultiOutputMixin, RegressorMixin, Ba
         self : object
             The fitted regressor.
         """
+        ways = np.asarray(self.presliding, dtype=float)
+        if not (np.isfinite(ways) & (ways > 0)).all():
+            raise ValueError(
+                f"presliding={self.presliding!r}; expected distances above 0, in rad or m, such as "
+                "(0.01, 0.05)"
+            )
         X, y = validate_motion(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
         self._one_dimensional = y.ndim == 1
         targets = y.reshape(len(y), -1)

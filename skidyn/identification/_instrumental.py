@@ -25,6 +25,7 @@ from scipy.stats import t as student_t
 
 from skidyn._columns import with_columns
 from skidyn._exceptions import SkidynError
+from skidyn._order import order_in_time
 from skidyn._signals import Array, Signals
 from skidyn.evidence import (
     Fit,
@@ -67,11 +68,17 @@ def instrument_rows(problem: Problem, fit: Fit, signals: Signals, smooth: bool) 
     raised if the motion does not have the rows of the log.
     """
     own = problem.signals
-    same = signals.n_samples == own.n_samples
-    if not (same and np.array_equal(signals.trajectory, own.trajectory)):
+    if signals.n_samples != own.n_samples:
         raise ValueError(
             "instruments must have the rows of X, in its trajectories: "
             f"{signals.n_samples} rows for {own.n_samples}"
+        )
+    other_order = order_in_time(signals.trajectory, signals.time) is not None
+    if other_order or not np.array_equal(signals.trajectory, own.trajectory):
+        raise ValueError(
+            "instruments must have the rows of X, in the same order: their trajectories and times "
+            "follow in another one; give instruments.loc[X.index], or sort both by trajectory and "
+            "time"
         )
     motion = read_motion(signals, smooth, problem.torque)
     moved = motion.with_(robot=problem.robot)

@@ -159,7 +159,7 @@ def _names_of_fields(path: Path, cells: Sequence[str], headless: bool, shape: _S
     if headless:
         return [str(k) for k in range(len(cells))]
     if not shape.n_rows or shape.width == len(cells):
-        return list(cells)
+        return _without_nameless(path, cells, shape)
     if shape.width == len(cells) + 1 and shape.open_end:
         return [*cells, _NOTHING]
     if shape.width == len(cells) + 1:
@@ -172,6 +172,26 @@ def _names_of_fields(path: Path, cells: Sequence[str], headless: bool, shape: _S
         f"{path}: rows have {shape.width} fields, the header {len(cells)} "
         f"({', '.join(cells[:6])}{', ...' if len(cells) > 6 else ''}). Give each column a name."
     )
+
+
+def _without_nameless(path: Path, cells: Sequence[str], shape: _Shape) -> list[str]:
+    """The names of a header, of which one field without a name is left out."""
+    names = list(cells)
+    empty = [k for k, name in enumerate(names) if not name]
+    if len(empty) > 1:
+        raise LogError(
+            f"{path}: fields {', '.join(str(k + 1) for k in empty)} of the header have no name. "
+            "Give each column a name."
+        )
+    for k in empty:
+        names[k] = _NOTHING if shape.open_end and k == len(names) - 1 else _ROW_NAMES
+        if names[k] == _ROW_NAMES:
+            like = "row names, as written by pandas (to_csv(index=False) writes none)"
+            warn_about_log(
+                f"{path}: field {k + 1} of the header has no name. The field is interpreted as "
+                f"{like if k == 0 else 'no signal'}, and left out."
+            )
+    return names
 
 
 def _open_text(path: Path) -> Any:

@@ -197,6 +197,8 @@ def read_log(
     >>> folder.cleanup()
     """
     paths = _paths(path)
+    if missing not in ("error", "drop"):
+        raise LogError(f"missing is {missing!r}; expected 'error' or 'drop'.")
     _check_mapping("columns", columns, (str, int))
     _check_mapping("units", units, (str,))
     said: list[str] = []

@@ -13,6 +13,7 @@ from scipy.stats import t as student_t
 
 from skidyn._columns import column_names, resolve_columns
 from skidyn._exceptions import SkidynError
+from skidyn._order import order_in_time
 from skidyn._signals import Array, Signals, refuse_other_gravity, signals_from
 from skidyn.effects import Term
 from skidyn.evidence import Problem, make_problem
@@ -65,13 +66,17 @@ def read_runs(
 ) -> tuple[Signals, Array, NDArray[np.bool_], bool]:
     """Signals and torque of all runs, a mask of samples with the load, and whether to smooth.
 
-    A SkidynError is raised without a run, or if one has no torque columns.
+    A SkidynError is raised without a run, or if one has no torque columns, no rows, or rows that
+    are not in the order of time.
     """
     frames = [(frame, True) for frame in _frames(loaded, "loaded")]
     frames += [(frame, False) for frame in _frames(unloaded, "unloaded")]
     if not any(is_loaded for _, is_loaded in frames):
         raise SkidynError("no run with the load was given")
-    parts = [_read(robot, frame) for frame, _ in frames]
+    parts = [
+        _read(robot, frame, "a loaded run" if is_loaded else "an unloaded run")
+        for frame, is_loaded in frames
+    ]
     given = all(part[2] for part in parts)
     first, signals = 0, []
     for part, _, _ in parts:
@@ -187,7 +192,7 @@ def _frames(runs: Any, name: str) -> list[Any]:
     return frames
 
 
-def _read(robot: Robot, frame: Any) -> tuple[Signals, Array, bool]:
+def _read(robot: Robot, frame: Any, what: str) -> tuple[Signals, Array, bool]:
     refuse_other_gravity(frame, robot)
     names = column_names(frame)
     assert names is not None
@@ -196,19 +201,27 @@ def _read(robot: Robot, frame: Any) -> tuple[Signals, Array, bool]:
         wanted = [f"tau_{joint}" for joint in robot.joint_names]
     lost = [name for name in wanted if name not in names]
     if lost:
-        raise SkidynError(f"a run lacks the torque column(s) {', '.join(lost)}")
+        raise SkidynError(f"{what} lacks the torque column(s) {', '.join(lost)}")
+    if len(frame) == 0:
+        raise SkidynError(f"{what} has no rows; check the selection of its rows, or leave it out")
     columns = resolve_columns(names, len(names), robot.joint_names, require_acceleration=False)
     given = columns.ddq is not None
     if columns.time is None:
-        raise SkidynError("a run has no column time, which is needed for smoothing and averaging")
+        raise SkidynError(f"{what} has no column time, which is needed for smoothing and averaging")
     columns = replace(columns, temperature=None)
     table = np.zeros((len(frame), len(names)))
     for k in columns.used():
         table[:, k] = np.asarray(frame[names[k]], dtype=np.float64)
     torque = np.column_stack([np.asarray(frame[name], dtype=np.float64) for name in wanted])
     if not (np.isfinite(table).all() and np.isfinite(torque).all()):
-        raise SkidynError("a run holds values that are not finite; leave such rows out")
-    return signals_from(table, columns, robot, to_derive=True), torque, given
+        raise SkidynError(f"{what} holds values that are not finite; leave such rows out")
+    signals = signals_from(table, columns, robot, to_derive=True)
+    if order_in_time(signals.trajectory, signals.time) is not None:
+        raise SkidynError(
+            f"the rows of {what} are not in the order of time, which averaging needs; sort them: "
+            "table.sort_values(['trajectory', 'time'])"
+        )
+    return signals, torque, given
 
 
 def _joined(parts: Sequence[Signals], robot: Robot) -> Signals:

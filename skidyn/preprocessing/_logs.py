@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+
+#: Names of columns that hold positions.
+POSITION = re.compile(r"q(\d+$|_)")
+#: Share of the variance of positions, beyond which repetitions are other motions: those of half the
+#: size of the motion.
+OTHER_MOTION = 0.25
+#: Differences of positions in rad or m up to which a robot may be at rest, with noise only.
+NOISE = 1e-3
 
 
 def average_repetitions(frame: pd.DataFrame, *, period: float | None = None) -> pd.DataFrame:
@@ -40,7 +49,8 @@ def average_repetitions(frame: pd.DataFrame, *, period: float | None = None) -> 
     Raises
     ------
     ValueError
-        If repetitions differ in length.
+        If repetitions differ in length, or in position by more than half of the motion, or if
+        `period` is given for several trajectories.
 
     References
     ----------
@@ -67,14 +77,29 @@ def average_repetitions(frame: pd.DataFrame, *, period: float | None = None) -> 
         )
     average = runs[0].reset_index(drop=True).copy()
     signals = [name for name in frame.columns if name not in ("time", "trajectory")]
+    places = [name for name in signals if POSITION.match(str(name))]
+    _refuse_other_motions(
+        places,
+        np.array([run[places].to_numpy(float) for run in runs]),
+        "Average trajectories that repeat one motion from the same point on, or give period for "
+        "one periodic recording",
+    )
     average[signals] = np.mean([run[signals].to_numpy(float) for run in runs], axis=0)
     return average
 
 
 def _average_periods(frame: pd.DataFrame, period: float) -> pd.DataFrame:
+    names = frame["trajectory"].unique() if "trajectory" in frame else np.zeros(1)
+    if len(names) > 1:
+        raise ValueError(
+            f"period cuts one trajectory into repetitions, and the log has {len(names)}; give one "
+            f"at a time, such as log[log['trajectory'] == {names[0]}]."
+        )
+    if not period > 0:
+        raise ValueError(f"period={period!r}; a time above 0 s is expected.")
     time = frame["time"].to_numpy(float)
     if (np.diff(time) <= 0).any():
-        raise ValueError("time must increase; average one trajectory at a time.")
+        raise ValueError("time must increase from row to row; sort the log by time.")
     start, span = time[0], time[-1] - time[0]
     n_periods = int(np.floor(span / period))
     if n_periods < 2:
@@ -85,12 +110,39 @@ def _average_periods(frame: pd.DataFrame, period: float) -> pd.DataFrame:
         )
     average: pd.DataFrame = frame[time < start + period].reset_index(drop=True).copy()
     own = average["time"].to_numpy(float)
-    for name in frame.columns:
-        if name not in ("time", "trajectory"):
-            values = frame[name].to_numpy(float)
-            repeated = [np.interp(own + k * period, time, values) for k in range(n_periods)]
-            average[name] = np.mean(repeated, axis=0)
+    repeated = {
+        name: np.array(
+            [
+                np.interp(own + k * period, time, frame[name].to_numpy(float))
+                for k in range(n_periods)
+            ]
+        )
+        for name in frame.columns
+        if name not in ("time", "trajectory")
+    }
+    places = [name for name in repeated if POSITION.match(str(name))]
+    _refuse_other_motions(
+        places,
+        np.stack([repeated[name] for name in places], axis=-1) if places else np.zeros((1, 1, 0)),
+        f"Give the period of the motion in s; period={period:g} is none",
+    )
+    for name, values in repeated.items():
+        average[name] = np.mean(values, axis=0)
     return average
+
+
+def _refuse_other_motions(places: list[str], repetitions: Array, remedy: str) -> None:
+    """Refuse positions, shape (n_repetitions, n_rows, n_joints), that repeat no motion."""
+    apart = np.var(repetitions, axis=0).mean(axis=0)
+    whole = np.var(repetitions, axis=(0, 1))
+    if apart.sum() <= max(OTHER_MOTION * whole.sum(), NOISE**2):
+        return
+    worst = int(np.argmax(apart))
+    raise ValueError(
+        f"the repetitions are different motions: {places[worst]} differs between them by "
+        f"{np.sqrt(apart[worst]):.3g} (root mean square), and varies by "
+        f"{np.sqrt(whole[worst]):.3g} in all. {remedy}."
+    )
 
 
 def cross_fitted_residual(physics: Any, X: Any, y: Any, *, cv: Any = 5) -> Array:

@@ -80,7 +80,7 @@ class RigidBodyDynamics:
         Raises
         ------
         SkidynError
-            Signals or parameters have the wrong shape, or there is no C compiler.
+            Signals, parameters or gravity have the wrong shape, or there is no C compiler.
 
         Examples
         --------
@@ -92,7 +92,7 @@ class RigidBodyDynamics:
         signals = self._signals(q=q, dq=dq, ddq=ddq)
         return self._engine.inverse_dynamics(
             signals,
-            gravity,
+            _checked_gravity(gravity),
             parameters=self._parameters(parameters),
             dtype=dtype,
             backend=backend,
@@ -126,7 +126,10 @@ class RigidBodyDynamics:
         """
         _check_backend(backend, np.float64, "once")
         return self._engine.inverse_dynamics(
-            self._signals(q=q), gravity, parameters=self._parameters(parameters), backend=backend
+            self._signals(q=q),
+            _checked_gravity(gravity),
+            parameters=self._parameters(parameters),
+            backend=backend,
         )
 
     def inertial_torque(self, q: Any, ddq: Any, *, parameters: Any = None) -> np.ndarray:
@@ -389,6 +392,22 @@ class RigidBodyDynamics:
         if not -self.n_bodies <= body < self.n_bodies:
             raise SkidynError(f"body is {body}; the robot has {self.n_bodies} moving bodies.")
         return body % self.n_bodies, None
+
+
+def _checked_gravity(gravity: Any) -> Any:
+    """Three finite numbers, or None for the gravity of the robot."""
+    if gravity is None:
+        return None
+    try:
+        numbers = np.asarray(gravity, dtype=float)
+    except (TypeError, ValueError):
+        numbers = np.zeros(0)
+    if numbers.shape != (3,) or not np.isfinite(numbers).all():
+        raise SkidynError(
+            f"gravity is {gravity!r}; expected three finite numbers in m/s^2, such as (0, 0, "
+            "-9.81), or None for that of the robot."
+        )
+    return gravity
 
 
 def _check_backend(backend: str, dtype: Any, *others: str) -> None:

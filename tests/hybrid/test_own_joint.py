@@ -85,3 +85,10 @@ def test_the_torque_of_one_joint_of_several_needs_its_name():
     named = X.rename(columns=lambda name: name[:-1] + {"1": "_base", "2": "_tip"}[name[-1]])
     own = OwnJointRegressor(Ridge(), joint_names=["tip"]).fit(named, X["q2"])
     assert own.score(named, X["q2"]) > 0.99
+
+
+@pytest.mark.parametrize("presliding", [(0,), (-1.0, 0.1), (np.nan,)])
+def test_distances_that_are_none_are_refused(presliding):
+    X = np.random.default_rng(0).normal(size=(50, 3))
+    with pytest.raises(ValueError, match="expected distances above 0"):
+        OwnJointRegressor(Ridge(), presliding=presliding).fit(X, X[:, 1])

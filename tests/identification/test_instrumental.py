@@ -6,7 +6,7 @@ import pandas as pd
 import polars
 import pytest
 
-from skidyn.datasets import load_planar_arm
+from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.exceptions import SkidynError
 from skidyn.identification import RBDRegressor, repetition_instruments
 
@@ -74,3 +74,10 @@ def test_instruments_of_other_rows_are_refused():
     X, y, reference = noisy_motion(0, 0.1)
     with pytest.raises(ValueError, match="rows of X"):
         RBDRegressor(ROBOT, estimator="instrumental").fit(X, y, instruments=reference[:-1])
+
+
+def test_shuffled_instruments_are_refused():
+    log = make_hidden_effect_log(ROBOT, None, n_trajectories=2, duration=3.0)
+    model = RBDRegressor(ROBOT, estimator="instrumental")
+    with pytest.raises(ValueError, match="rows of X, in the same order"):
+        model.fit(log.X, log.y, instruments=log.X.sample(frac=1.0, random_state=0))

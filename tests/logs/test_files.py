@@ -36,6 +36,15 @@ def test_quoted_row_names_of_r_separated_by_blanks(tmp_path):
     np.testing.assert_array_equal(frame["q1"], [0.1, 0.2, 0.3])
 
 
+def test_the_nameless_index_of_pandas_is_no_signal(tmp_path):
+    rows = "".join(f"{k},{row}\n" for k, row in enumerate(ROWS.split()))
+    with pytest.warns(LogWarning, match="field 1 of the header has no name.*by pandas"):
+        frame = read(tmp_path / "log.csv", "," + HEADER + rows)
+    assert "" not in frame.columns and frame["tau1"].tolist() == [0.2, 0.3, 0.4]
+    with pytest.raises(LogError, match="missing is 'foo'; expected 'error' or 'drop'"):
+        read_log(tmp_path / "log.csv", missing="foo")
+
+
 def test_a_separator_at_the_end_of_rows_is_no_field(tmp_path):
     frame = read(tmp_path / "log.csv", HEADER + ROWS.replace("\n", ",\n"))
     np.testing.assert_array_equal(frame["tau1"], [0.2, 0.3, 0.4])

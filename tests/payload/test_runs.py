@@ -19,6 +19,8 @@ RUN = LOG.frame[LOG.frame["trajectory"] == 1]
         (RUN.drop(columns="tau2"), {}, r"lacks the torque column\(s\) tau2"),
         ([RUN.to_numpy()], {}, "loaded holds a ndarray"),
         (RUN.drop(columns="time"), {}, "no column time"),
+        (RUN[:0], {}, "a loaded run has no rows"),
+        (RUN.sample(frac=1.0, random_state=0), {}, "a loaded run are not in the order of time"),
         (RUN, {"link": "gripper"}, "no link 'gripper'"),
         (RUN, {"link": "base"}, "does not move"),
         (RUN, {"smooth": False}, "needs accelerations"),

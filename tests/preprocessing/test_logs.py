@@ -35,6 +35,23 @@ def test_periods_of_one_recording():
         average_repetitions(log, period=6.0 / 1.0 - 0.5 - 1.5)
 
 
+def test_other_motions_are_not_averaged():
+    time = np.arange(0, 8, 0.01)
+    motions = [
+        pd.DataFrame({"time": time, "trajectory": k, "q1": np.sin((1 + k) * time), "tau1": 1.0})
+        for k in range(3)
+    ]
+    log = pd.concat(motions, ignore_index=True)
+    with pytest.raises(ValueError, match="different motions: q1 differs between them by 0.5"):
+        average_repetitions(log)
+    with pytest.raises(ValueError, match="cuts one trajectory into repetitions, and the log has 3"):
+        average_repetitions(log, period=2.0)
+    with pytest.raises(ValueError, match="different motions.*period=2.6 is none"):
+        average_repetitions(motions[0], period=2.6)
+    rest = np.random.default_rng(0).normal(0, 1e-5, len(log))
+    assert len(average_repetitions(log.assign(q1=rest))) == len(time)
+
+
 def test_residual_is_honest():
     rng = np.random.default_rng(0)
     X = pd.DataFrame(rng.normal(size=(40, 30))).rename(columns=str)

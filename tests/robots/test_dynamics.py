@@ -348,3 +348,12 @@ def test_mujoco_agrees():
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         mujoco.mj_inverse(model, data)
         np.testing.assert_allclose(data.qfrc_inverse, expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("gravity", [[0, 0, -9.81, 1], [0, 0, np.nan], "down"])
+def test_gravity_that_is_no_vector_is_refused(gravity):
+    robot = load_planar_arm()
+    with pytest.raises(ValueError, match="expected three finite numbers in m/s"):
+        robot.gravity_torque([[0.0, 0.0]], gravity=gravity)
+    with pytest.raises(ValueError, match="expected three finite numbers in m/s"):
+        robot.inverse_dynamics([[0.0, 0.0]], [[0.0, 0.0]], [[0.0, 0.0]], gravity=gravity)
