@@ -106,7 +106,8 @@ def drift(
     Raises
     ------
     SkidynError
-        A joint has no evaluated sample.
+        A joint has no evaluated sample, or the reference has fewer than four trajectories and
+        there are no `folds`.
 
     Examples
     --------
@@ -125,10 +126,12 @@ def drift(
         try:
             folds = list(TrajectoryKFold(n_splits=4).split(X_reference, known))
         except ValueError as few:
+            why = str(few).partition(".")[0]  # the remedies of the folds are no options here
             raise SkidynError(
                 f"the reference cannot be cut into the four folds of whole trajectories that are "
-                f"held out by default ({few}); give folds=, a list of pairs of training and test "
-                "rows"
+                f"held out by default ({why}); give a reference with a column 'trajectory' that "
+                "numbers four recordings at least, or give folds=, a list of pairs of training and "
+                "test rows"
             ) from few
     told = np.full(known.shape, np.nan)
     for train, test in folds:

@@ -81,3 +81,12 @@ def test_options_of_other_types_are_one_line(work, option, capsys):
     error = capsys.readouterr().err
     assert "expected" in error or "more than" in error or "--drive-gains" in option
     assert "Traceback" not in error
+
+
+@pytest.mark.parametrize("jobs", ["0", "-3", "many"])
+def test_numbers_of_processes_that_are_none_are_refused(work, jobs, capsys):
+    words = ["diagnose", str(work / "log.csv"), "--urdf", str(work / "arm.urdf")]
+    with pytest.raises(SystemExit) as stop:
+        cli.main([*words, f"--jobs={jobs}"])
+    assert stop.value.code == cli.BAD_INPUT
+    assert "expected 1 or more, or -1" in capsys.readouterr().err

@@ -2,6 +2,7 @@
 """A robot against itself, healthy and changed."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from sklearn.linear_model import LinearRegression
 
@@ -52,3 +53,8 @@ def test_drift_is_a_result_by_itself():
 def test_a_reference_of_few_trajectories_needs_folds(recording):
     with pytest.raises(SkidynError, match="give folds="):
         drift(LinearRegression(), *recording, *recording)
+    X, y = recording
+    few = pd.DataFrame(X, columns=["q1", "q2", "q3"]).assign(trajectory=np.arange(200) // 70)
+    with pytest.raises(SkidynError, match="X has 3.; give a reference with a column") as error:
+        drift(LinearRegression(), few, y, few, y)
+    assert "n_splits, or" not in str(error.value)
