@@ -88,7 +88,7 @@ def motion_of(estimator: Any, X: Any) -> Any:
         return X
     for key in ("trajectory", "time"):
         place = getattr(estimator, key, None)
-        if isinstance(place, Integral):
+        if isinstance(place, Integral) and -len(names) <= int(place) < len(names):
             raise ColumnError(
                 f"X has columns of torque, which are left out, while {key}={place} counts all "
                 f"columns. Give the name of the column, such as {key}={names[int(place)]!r}, or "

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -308,7 +308,10 @@ def _code(kind: str, term: Term, joints: Sequence[int], with_formula: Sequence[i
 def _sentence(finding: Finding, formulas: Mapping[int, str]) -> str:
     """What is said of a finding; ``formulas`` are equivalent ones by joint."""
     (term,) = finding.terms
-    told = told_briefly(finding.title, finding.joints, finding.trajectories, finding.parameters)
+    shapes = {shape.name for shape in term.effect.shapes}
+    told = told_briefly(
+        finding.title, finding.joints, finding.trajectories, finding.parameters, shapes
+    )
     sentence = f"{told}. "
     sentence += f"It {spans_told(term.spans)}. " if term.spans else ""
     sentence += f"It {course_told(term)}. " if term.course else ""
@@ -372,13 +375,19 @@ def told_briefly(
     joints: tuple[int, ...],
     trajectories: tuple[int, ...] | None,
     parameters: dict[str, dict[str, Any]],
+    shapes: Collection[str] = (),
 ) -> str:
-    """Effect, joints, and its first parameter or vector, without a full stop."""
+    """Effect, joints, and its first parameter or vector, without a full stop.
+
+    A shape parameter is no size: it is told only in place of sizes that may be zero.
+    """
     where = joints_told(joints)
     if trajectories is not None:
         where += f" in {trajectories_told(trajectories)}"
     # the first that is clearly not zero, with the other components of its vector
-    rows = sorted(parameters.items(), key=lambda item: _doubt_of(item[1]))
+    rows = sorted(
+        parameters.items(), key=lambda item: max(_doubt_of(item[1]), int(item[0] in shapes))
+    )
     stem = _stem(rows[0][0]) if rows else ""
     own = [_value(name, row) for name, row in parameters.items() if _stem(name) == stem]
     sizes = ", ".join(filter(None, own))
@@ -443,10 +452,10 @@ def _fall_told(drop: float, averaged: float | None) -> str:
 
 
 def _doubt_of(row: dict[str, Any]) -> int:
-    """2 if the interval of a parameter contains zero, 1 if it is wide, 0 otherwise."""
+    """2 if the interval of a parameter contains zero, 1 if it is wide or there is none, else 0."""
     value, low, high = row["value"], row["low"], row["high"]
     if not isinstance(value, float) or low is None:
-        return 0
+        return 1
     if low <= 0 <= high:
         return 2
     return int(high - low > WIDE * abs(value))

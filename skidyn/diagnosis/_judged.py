@@ -160,7 +160,7 @@ def _held_out(
     rest = [t for t in terms if t not in waves]
     bare = replace_torque(problem, torque) if waves else problem
     # Joints weigh by the errors of these terms, as where a model with them is fitted.
-    own = result.fit if len(rest) == len(result.fit.terms) else bare.fit(rest)
+    own = result.fit if set(rest) == set(result.fit.terms) else bare.fit(rest)
     residual, held = held_out_residual(bare, rest, own.sigma, keep)
     return residual, held | waves
 

@@ -99,8 +99,8 @@ BEYOND_FORMULAS = 0.5
 #: Of explanations that the data cannot separate, one is preferred with which the torque of the
 #: identified bodies differs from that of the described ones by less than this share of the others.
 NEARER = 0.5
-#: Share of the recordings with friction above which it is one of all of them, which changes
-#: (``_reconsideration.py``).
+#: Share of the recordings with friction, or with an offset, above which it is one of all of them,
+#: which changes (``_reconsideration.py``).
 IN_MOST = 0.5
 #: Twice the difference in log-likelihood below which two exact formulas with equally many numbers
 #: have the same torque beside the bodies: e to this half is hardly any evidence.

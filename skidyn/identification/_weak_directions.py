@@ -11,10 +11,10 @@ base parameters with the effects eliminated, and ``C`` the covariance of the bas
 relative changes of all bodies by 1, they are the eigenvectors of ``S`` with respect to ``C^-1``.
 For an eigenvalue ``l`` the relative standard error of the data is ``1/sqrt(l)``. The relative error
 of the URDF, ``t``, and the excess of the rows' scatter over white noise, ``f``, maximise the
-likelihood of the least-squares coordinates ``z``, of variance ``t^2 + f / l`` and Student's law,
-times weak priors (empirical Bayes): an effect that the model lacks, such as a counterweight, moves
-a few of them far. Where left-out folds contradict their ratio, a larger one is used.
-With ``x = l t^2 / f`` a direction keeps the share ``x^3 / (1 + x^3)`` of its distance from
+likelihood of the least-squares coordinates ``z``, which have Student's law with the squared scale
+``t^2 + f / l``, times weak priors (empirical Bayes): an effect that the model lacks, such as a
+counterweight, moves a few of them far. Where left-out folds contradict ``t^2 / f``, a larger ratio
+is used. With ``x = l t^2 / f`` a direction keeps the share ``x^3 / (1 + x^3)`` of its distance from
 the URDF. With the third power the transition is sharp: a direction that the data determines ten
 times better than the URDF changes by one part in a million.
 
@@ -95,13 +95,14 @@ def keep_weak_directions(
 
     z = found.into @ coefficients[:n]
     spread, excess = _spreads(z, values)
-    share = _supported(found, spread**2 / excess, grams, cross, float(whole.counts.sum()))
-    if whole.instruments is not None or not trusted:
+    if not trusted and len(kept) == n:  # all directions are determined
+        share = np.ones(n)
+    elif whole.instruments is not None or not trusted:
         # Instruments remove a bias that the information does not contain: only open directions are
         # kept.
         share = (values > 0).astype(float)
-    if not trusted and len(kept) == n:  # all directions are determined
-        share = np.ones(n)
+    else:
+        share = _supported(found, spread**2 / excess, grams, cross, float(whole.counts.sum()))
     moved = directions @ ((share - 1) * z)
     coefficients[:n] += moved
     coefficients[n:] -= follow @ moved

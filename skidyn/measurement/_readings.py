@@ -21,6 +21,7 @@ from skidyn.measurement._fits import Fits
 from skidyn.measurement._outcome import Outcome
 from skidyn.measurement._peak import climb, peak
 from skidyn.measurement._reading import Reading
+from skidyn.measurement._robust import FREEDOM
 
 #: Least log-likelihood gain of a change, corrected for the correlation of neighbouring rows.
 LEAST = 15.0
@@ -60,9 +61,8 @@ NEAR, SWEEPS = np.deg2rad(1.0), 3
 OTHER_BODIES = "bodies that differ from the description"
 #: Rounds of the fits for ranking, and number of changes that are examined in detail.
 SCREENED, FINALISTS = 1, 12
-#: Fewest recordings of which a share may contradict a zero, this share, and degrees of freedom of
-#: the law of residuals.
-FEW, MOST_AGAINST, LAW = 3, 0.3, 4.0
+#: Fewest recordings of which a share may contradict a zero, and this share.
+FEW, MOST_AGAINST = 3, 0.3
 #: Angles of every joint that are tried beside loads.
 ANGLES = 3
 
@@ -179,7 +179,7 @@ def _in_most_recordings(fits: Fits, zero: Change, here: Outcome) -> bool:
     gains = np.zeros(len(names))
     for k in set(here.fits) & set(there.fits):
         use, scale = fits.moving[:, k], there.scale[k]
-        size = [np.log1p((o.residual[k] / scale) ** 2 / LAW) for o in (here, there)]
+        size = [np.log1p((o.residual[k] / scale) ** 2 / FREEDOM) for o in (here, there)]
         gains += np.bincount(place[use], size[0] - size[1], len(names))
     return len(names) < FEW or bool(np.mean(gains < 0) < MOST_AGAINST)
 

@@ -245,8 +245,9 @@ def _at_own_scale(
         own, gained = joint_gain(fits.loaded(), k, gain)
         wrong = not USUAL[0] <= gain <= USUAL[1] and k in known
         sure = gained > (LEAST if wrong else SURE) and not low <= own <= high
-        if gained > 0 and spring_gain(fits.loaded(), k) > gained:
-            continue  # a spring or a counterweight, and no scale
+        told = sure or (wrong and gained > 0)
+        if not told or spring_gain(fits.loaded(), k) > gained:
+            continue  # nothing, or a spring or a counterweight, and no scale
         far_off = (scale_gain(fits.loaded(), k, times * own) for times in (0.25, 4.0))
         if sure and gained - max(far_off) > LEAST:
             found[k] = own

@@ -7,7 +7,7 @@ import numpy as np
 
 from skidyn.datasets import load_planar_arm, make_hidden_effect_log
 from skidyn.diagnosis import diagnose, notes
-from skidyn.diagnosis._findings import effect_curves
+from skidyn.diagnosis._findings import effect_curves, told_briefly
 from skidyn.effects import Term
 from skidyn.identification import RBDRegressor
 
@@ -78,3 +78,16 @@ def test_a_ripple_is_told_as_gear_ratio_or_lead():
 
     assert "if it is 101." in notes("torque_ripple", rows(202.0, "1/rad"))[-1]
     assert "every 5 mm" in notes("torque_ripple", rows(2e3 * np.pi / 5, "1/m"))[-1]
+
+
+def test_the_first_size_that_is_certain_is_told_and_no_shape():
+    def row(value, half):
+        ends = (None, None) if half is None else (value - half, value + half)
+        return {"value": value, "low": ends[0], "high": ends[1], "unit": "N m"}
+
+    drift = {"dFv": row(0.016, 0.012), "dFc": row(-1.407, 0.028)}
+    assert ": dFc = " in told_briefly("Friction drift", (1,), None, drift)
+    ripple = {"A": row(0.149, 0.08), "N": row(201.9, 0.36)}
+    assert ": A = " in told_briefly("Torque ripple", (4,), None, ripple, {"N"})
+    spring = {"k1": row(1.9, 0.7), "q_middle": row(0.1, None)}
+    assert ": k1 = " in told_briefly("Nonlinear spring", (2,), None, spring)

@@ -57,6 +57,8 @@ class What(Picture):
 
 def _formula(finding: Finding) -> str:
     """The formula of a finding in its form, in LaTeX; none of an unknown torque."""
-    if finding.kind == "unknown" or not finding.terms:
+    if finding.kind == "unknown":
         return ""
-    return get_effect(finding.kind).formula_of(finding.terms[0].shape)
+    # a setting of a servo is no term
+    shape = finding.terms[0].shape if finding.terms else {}
+    return get_effect(finding.kind).formula_of(shape)
