@@ -408,9 +408,9 @@ def _joint_notes(problem: Problem, parts: Remainder, errors: Array) -> list[str]
             "the joint slides, away from rest and reversals."
         )
     return notes + [
-        f"The error of {names[j]} on recordings that were left out, {errors[j]:.3g}, is due to "
-        "extrapolation: the joint slides in few recordings, and fitted to all of them the model "
-        "explains its torque up to noise. Record more motion of this joint."
+        f"The error of {names[j]} on what was left out, {errors[j]:.3g}, is due to extrapolation: "
+        "the rest of the log does not determine the model there, and fitted to the whole log the "
+        "model explains its torque up to noise. Record more motion of this joint."
         for j in np.flatnonzero(extrapolated if extrapolated is not None else [])
     ]
 

@@ -32,7 +32,7 @@ from skidyn.diagnosis._hypothesis import SearchResult
 from skidyn.diagnosis._limits import Gates, Limit, find_limits, without_withdrawn
 from skidyn.diagnosis._result import Diagnosis
 from skidyn.diagnosis._reversals import look_at_reversals
-from skidyn.diagnosis._rule import Settings
+from skidyn.diagnosis._rule import ROWS_PER_COEFFICIENT, Settings
 from skidyn.diagnosis._search import search
 from skidyn.diagnosis._servo_settings import (
     Servos,
@@ -483,9 +483,10 @@ FEWEST_WINDOWS = 8
 
 
 def _check_rows(problem: Problem, files: Sequence[str] = ()) -> None:
-    """Refuse a log, of some files, in which no joint moves long enough."""
+    """Refuse a log, of some files, in which the joints do not move long enough."""
     counts = problem.rows.counts
-    if max(counts) >= FEWEST_WINDOWS:
+    width = len(problem.rigid_index) + sum(term.width for term in problem.terms)
+    if max(counts) >= FEWEST_WINDOWS and sum(counts) >= ROWS_PER_COEFFICIENT * width:
         return
     names = list(dict.fromkeys(files))
     source = f"{names[0]}: " if len(names) == 1 else ""
@@ -494,10 +495,11 @@ def _check_rows(problem: Problem, files: Sequence[str] = ()) -> None:
     length = sum(step * (rows.stop - rows.start - 1) for rows, step in steps)
     raise LogError(
         f"{source}no joint moves long enough for a diagnosis: of the {length:.3g} s in "
-        f"{counted(len(np.unique(signals.trajectory)), 'trajectory')}, at most "
-        f"{counted(int(max(counts)), 'averaging window')} away from rest and reversals are left "
-        f"for a joint, and {FEWEST_WINDOWS} are needed. Record at least 10 s in which every joint "
-        "moves, better several trajectories, or pass further recordings"
+        f"{counted(len(np.unique(signals.trajectory)), 'trajectory')}, "
+        f"{counted(int(sum(counts)), 'averaging window')} away from rest and reversals are left, "
+        f"at most {int(max(counts))} for a joint; {ROWS_PER_COEFFICIENT * width} are needed, "
+        f"and {FEWEST_WINDOWS} for a joint. Record at least 10 s in which every joint moves, "
+        "better several trajectories, or pass further recordings"
     )
 
 

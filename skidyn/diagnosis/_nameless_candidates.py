@@ -12,6 +12,7 @@ from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._clock import LOWEST, slow_lines
 from skidyn.diagnosis._followed_signals import Followed, followed_signals
 from skidyn.diagnosis._hypothesis import UNKNOWN
+from skidyn.diagnosis._rule import ROWS_PER_COEFFICIENT
 from skidyn.diagnosis._spectrum import SLOWEST
 from skidyn.effects import (
     ClockPeriodic,
@@ -80,7 +81,8 @@ def nameless_candidates(
             shapes += [(shape, 1) for shape in waves.get(effect.kind, ())]
             for shape, among in shapes:
                 term = Term.at(effect.kind, joints, shape)
-                made.append((term, effect.variables(joint, shape), among))
+                if term.width * ROWS_PER_COEFFICIENT <= problem.rows.counts[joint]:
+                    made.append((term, effect.variables(joint, shape), among))
     all_rows = problem.prepare([term for term, *_ in made], screening=True)
     return [
         Candidate(UNKNOWN, term, rows, names, len(term.effect.shapes), n_chosen=among)

@@ -62,8 +62,9 @@ class Remainder:
         Whether the error exceeds the fast noise by a similar factor on all joints, as noise that is
         correlated in time does; a missing torque is larger on some joints than on others.
     extrapolated : ndarray of shape (n_joints,) of bool or None
-        Joints that slide in few recordings only and whose torque the model, fitted to all
-        recordings, explains up to noise: their held-out error is due to extrapolation.
+        Joints that slide in few recordings only, or all of a log of few recordings, whose torque
+        the model explains up to noise if it is fitted to all: their held-out error is due to
+        extrapolation.
 
     Examples
     --------
@@ -147,7 +148,11 @@ def find_remainder(
     if coloured:
         material[:] = False
     material |= (predictable > noise) & (predictable > REMAINDER_PREDICTABLE_SHARE * span)
-    extrapolated = material & _seldom(problem) & (rows <= REMAINDER_TIMES_NOISE * noise)
+    # what the coefficients took of the noise of these rows is not explained
+    n_rows = sum(map(len, averaged))
+    fitted = rows * np.sqrt(n_rows / max(n_rows - len(fit.coefficients), 1))
+    beyond = _seldom(problem) | (not problem.whole_trajectories)
+    extrapolated = material & beyond & (fitted <= REMAINDER_TIMES_NOISE * noise)
     material &= ~extrapolated
     return Remainder(
         sensor, position, predictable, left, inflation, material, coloured, extrapolated

@@ -71,6 +71,9 @@ FEW_WAVES = 4.0
 HARMONIC = 0.03
 #: Multiple of the log-likelihood that the best sine gains from which ripple has another form.
 NO_SINE = 1.1
+#: Rows that a log must have for each coefficient of the model, and those of a joint for each
+#: coefficient of an unknown function: with fewer, what is held out is extrapolated.
+ROWS_PER_COEFFICIENT = 2
 #: A column of which less than this share is new to the model is not tested.
 NEW_SHARE = 1e-6
 #: Relative rounding error of what a column removes, found from products.

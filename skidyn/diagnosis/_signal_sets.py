@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sets of one to three signals of which a function of any form predicts a residual.
 
-A function of a signal is a sum of hats (linear between knots at its quantiles), and one of several
-signals a sum of products of their hats. Every signal, every pair of signals of near joints and, if
-one of these predicts anything, the best pairs with a third signal are fitted to all folds but one
-at a time; the set that predicts the folds left out best is the set on which the residual depends.
+A function of a signal is a sum of hats (piecewise linear functions), and one of several signals a
+sum of products of their hats, as in the terms that are then fitted. Every signal, every pair of
+signals of near joints and, if one of these predicts anything, the best pairs with a third signal
+are fitted to all folds but one at a time; the set that predicts the folds left out best is the set
+on which the residual depends.
 Held-out errors need only the products of the columns within each fold.
 """
 
@@ -18,21 +19,18 @@ from numpy.typing import NDArray
 
 from skidyn._signals import Array
 from skidyn.diagnosis._signal_products import LEAST_SHARE, predictable, simple_functions
-from skidyn.effects import Factor
+from skidyn.effects import Factor, hats, knots_between, products
 
 #: Most rows that are used.
 MOST_ROWS = 1000
 #: Knots of the hats of each signal of a set of one, two and three.
-KNOTS = (8, 6, 4)
-#: Penalty of the squared coefficients, relative to the mean square of a column.
-RIDGE = 0.1
+KNOTS = (20, 7, 4)
+#: Penalty of the squared coefficients, relative to the largest mean square of a column.
+RIDGE = 1e-2
 #: Number of the best pairs to which a third signal is added.
 PAIRS = 3
 #: Share of the error of the best smaller set that a further signal must remove.
 FURTHER = 0.1
-#: Singular values of the hats below this share of the largest are left out.
-RESOLVED = 1e-6
-
 #: Number of sets whose columns are held at once.
 AT_ONCE = 32
 
@@ -108,11 +106,10 @@ def product_with_function(
         no product predicts the residual.
     """
     own, y, parts = _thinned({name: signals[name] for name in names}, y, fold)
-    hats = {name: _hats(x, KNOTS[len(names) - 1]) for name, x in own.items()}
     tried, blocks = [], []
     for name, x in own.items():
         others = tuple(other for other in names if other != name)
-        free = _products([hats[other] for other in others])
+        free = _block([_hats(own[other], KNOTS[len(others)]) for other in others])
         for factor in simple_functions(name, x):
             values = factor.of(x)
             tried.append((factor, others))
@@ -139,11 +136,11 @@ def _ranked(
     """Sets of equally many signals with their held-out error of every fold, least error first."""
     if not sets:
         return []
-    hats = {name: _hats(x, KNOTS[len(sets[0]) - 1]) for name, x in signals.items()}
+    functions = {name: _hats(x, KNOTS[len(sets[0]) - 1]) for name, x in signals.items()}
     left: list[Array] = []
     for start in range(0, len(sets), AT_ONCE):
-        some = [[hats[name] for name in names] for names in sets[start : start + AT_ONCE]]
-        left.extend(_errors(np.stack([*map(_products, some)]), y, parts))
+        some = [[functions[name] for name in names] for names in sets[start : start + AT_ONCE]]
+        left.extend(_errors(np.stack([*map(_block, some)]), y, parts))
     return sorted(zip(sets, left, strict=True), key=lambda item: float(item[1].sum()))
 
 
@@ -213,18 +210,11 @@ def solved(gram: Array, right: Array) -> Array:
 
 
 def _hats(x: Array, count: int) -> Array:
-    """Hats of a signal as orthogonal columns of mean square 1, or zero, shape (n_rows, count)."""
-    knots = np.unique(np.quantile(x, np.linspace(0.0, 1.0, count)))
-    hats = [np.interp(x, knots, hat) for hat in np.eye(len(knots))]
-    left, size, _ = np.linalg.svd(np.column_stack(hats), full_matrices=False)
-    columns = np.zeros((len(x), count))
-    columns[:, : len(size)] = left * np.sqrt(len(x)) * (size > RESOLVED * size[0])
-    return columns
+    """Piecewise linear functions of a signal, shape (n_rows, count)."""
+    return hats(x, knots_between(x, float(x.min()), float(x.max()), count))
 
 
-def _products(hats: Sequence[Array]) -> Array:
-    """All products of one column of each, shape (n_rows, n_products)."""
-    columns = hats[0]
-    for other in hats[1:]:
-        columns = (columns[:, :, None] * other[:, None, :]).reshape(len(columns), -1)
-    return columns
+def _block(functions: Sequence[Array]) -> Array:
+    """Products of functions of some signals, of which the largest has a mean square of 1."""
+    block = products(functions)
+    return np.asarray(block / np.sqrt(np.mean(block**2, axis=0).max()))

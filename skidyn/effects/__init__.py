@@ -59,6 +59,11 @@ from skidyn.effects._registry import (
     nameless_kinds as nameless_kinds,
     searched_kinds as searched_kinds,
 )
+from skidyn.effects._smooth import (
+    hats as hats,
+    knots_between as knots_between,
+    products as products,
+)
 
 
 def __getattr__(name: str) -> Any:

@@ -78,11 +78,8 @@ class Effect:
         With ``search="trajectories"``: whether the trajectories with the larger first coefficient
         have the effect, even if they are the majority, as a payload adds mass.
     softness : float
-        Ridge penalty relative to the square of its largest column when parts of the data are left
-        out; for flexible functions that may be undetermined there.
-    drawn : float
-        The same penalty in all fits; for functions of several signals, which are evaluated between
-        and beyond the data.
+        Ridge penalty relative to the square of its largest column; for flexible functions, which
+        the data may leave undetermined somewhere.
     by_recording : bool
         Whether it may differ between recordings, and is also tested for some of them only.
     drifts : bool
@@ -156,7 +153,6 @@ class Effect:
     drifts: ClassVar[bool] = False
     sizes_by_recording: ClassVar[bool] = False
     softness: ClassVar[float] = 0.0
-    drawn: ClassVar[float] = 0.0
     is_exact: ClassVar[bool] = False
     moves_link: ClassVar[bool] = False
     follows_acceleration: ClassVar[bool] = False

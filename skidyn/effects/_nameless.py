@@ -14,7 +14,7 @@ import numpy as np
 from skidyn._signals import Array, Signals
 from skidyn.effects._base import Effect
 from skidyn.effects._parameters import Coefficient
-from skidyn.effects._smooth import ordered_functions, range_of, splines
+from skidyn.effects._smooth import range_of, splines
 
 
 def unnamed_coefficients(count: int) -> tuple[Coefficient, ...]:
@@ -205,7 +205,8 @@ class FunctionOfPositionAndVelocity(_Spline):
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
         low, high = shape["low"], shape["high"]
-        orders = ordered_functions(signals.q[:, joint], None, low, high)[:, :3]
+        x = np.clip((2 * signals.q[:, joint] - low - high) / (high - low), -1.0, 1.0)
+        orders = np.column_stack([np.ones_like(x), x, x**2])
         dq = signals.dq[:, joint]
         motion = (dq, signals.sign[:, joint], np.abs(dq))
         return np.hstack([orders * m[:, None] for m in motion])

@@ -10,8 +10,11 @@ import numpy as np
 
 from skidyn._signals import Array, Signals
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
-from skidyn.effects._nameless_signals import logged_variables, products_of_low_order, ranges_of
+from skidyn.effects._nameless_signals import knots_over, logged_variables, products_of_hats
 from skidyn.effects._parameters import Coefficient
+
+#: Knots of each of two signals of a free function; twice as many of a single one.
+_KNOTS = 4
 
 
 class Factor(NamedTuple):
@@ -84,15 +87,16 @@ class ProductWithFunction(NamelessEffect):
     """A simple function of a signal times a free function of one or two others.
 
     The dry friction of a joint over the position of another, or a force that a joint changes by its
-    position. The free function is a polynomial of low order, as of
+    position. The free function is a coarse one, as of
     :class:`~skidyn.effects.FunctionOfSignals`, which a short log determines.
     """
 
     kind = "product_with_function"
     title = "Product of a signal and a function of others"
     formula = r"f_1(s_1)\,f(s_2)\ \text{or}\ f_1(s_1)\,f(s_2, s_3)"
-    coefficients = unnamed_coefficients(10)
+    coefficients = unnamed_coefficients(_KNOTS**2)
     search = "screened"
+    softness = 3e-3
 
     def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
         return logged_variables(sorted((shape["by"], *shape["of"])))
@@ -101,7 +105,7 @@ class ProductWithFunction(NamelessEffect):
         return []
 
     def shape_of(self, signals: Signals, factor: Factor, names: Sequence[str]) -> dict[str, Any]:
-        """Shape of a product, over the range that the other signals cover.
+        """Shape of a product, with the knots of the other signals.
 
         Parameters
         ----------
@@ -113,14 +117,15 @@ class ProductWithFunction(NamelessEffect):
         """
         by, function, middle = factor
         shape = {"by": by, "function": function, "middle": middle}
-        return shape | ranges_of(signals, names)
+        return shape | knots_over(signals, names, _KNOTS if len(names) > 1 else 2 * _KNOTS)
 
     def coefficients_of(self, shape: Mapping[str, Any]) -> tuple[Coefficient, ...]:
-        return self.coefficients[:6] if len(shape.get("of", ())) == 1 else self.coefficients
+        return (
+            self.coefficients[: 2 * _KNOTS] if len(shape.get("of", ())) == 1 else self.coefficients
+        )
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        ranges = shape["of"], shape["low"], shape["high"]
-        free = products_of_low_order(signals, *ranges, len(self.coefficients_of(shape)))
+        free = products_of_hats(signals, shape["of"], shape["knots"])
         factor = Factor(shape["by"], shape["function"], shape["middle"])
         return _values(signals, factor)[:, None] * free
 

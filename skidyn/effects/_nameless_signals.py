@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
@@ -14,16 +13,15 @@ from skidyn.effects._base import Effect
 from skidyn.effects._nameless import NamelessEffect, unnamed_coefficients
 from skidyn.effects._parameters import Shape
 from skidyn.effects._smooth import (
-    HIGHEST_ORDER,
-    ordered_functions,
+    hats,
+    knots_of,
+    products,
     range_of,
     splines,
     supported_range,
     supported_ranges,
 )
 
-#: Highest degree of a product of functions of two signals.
-HIGHEST_OF_TWO = 5
 #: Difference between the ratios of torque and of distance above which a coupling is not elastic.
 _UNEQUAL = 0.2
 #: Number of pairs of joints, nearest first, between which a torque is tried.
@@ -36,15 +34,17 @@ def logged_variables(names: Iterable[str]) -> tuple[str, ...]:
 
 
 class FunctionOfSignals(NamelessEffect):
-    """A smooth function of the few signals on which the residual was found to depend.
+    """A function of the few signals on which the residual was found to depend.
 
-    Products of Legendre polynomials of positions and accelerations, and of powers of velocities
-    with their direction, the lowest orders first.
+    All products of piecewise linear functions of each signal, as those with which its signals were
+    found. They are local, so that no recording decides what the function is where it has not been.
     """
 
     n_signals: ClassVar[int] = 1
+    #: Knots of the functions of each signal.
+    n_knots: ClassVar[int] = 20
     search: ClassVar[Literal["screened", "given"]] = "screened"
-    drawn = 1e-2
+    softness = 3e-3
 
     def variables(self, joint: int, shape: dict[str, Any]) -> tuple[str, ...]:
         return logged_variables(shape["of"])
@@ -53,7 +53,7 @@ class FunctionOfSignals(NamelessEffect):
         return []
 
     def shape_of(self, signals: Signals, names: Sequence[str]) -> dict[str, Any]:
-        """Shape of a function of some signals, over the range that they cover.
+        """Shape of a function of some signals, with its knots.
 
         Parameters
         ----------
@@ -61,7 +61,7 @@ class FunctionOfSignals(NamelessEffect):
         names : sequence of str
             Signals, joints counted from 1, such as ``"q2"``.
         """
-        return ranges_of(signals, names)
+        return knots_over(signals, names, self.n_knots)
 
     def admits(self, names: Sequence[str]) -> bool:
         """Whether it can be a function of some signals.
@@ -74,62 +74,48 @@ class FunctionOfSignals(NamelessEffect):
         return len(names) == self.n_signals
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        ranges = shape["of"], shape["low"], shape["high"]
-        return products_of_low_order(signals, *ranges, len(self.coefficients))
+        return products_of_hats(signals, shape["of"], shape["knots"])
 
 
-def ranges_of(signals: Signals, names: Sequence[str]) -> dict[str, Any]:
-    """Some signals and the ranges that they cover, as entries of a shape.
+def knots_over(signals: Signals, names: Sequence[str], count: int) -> dict[str, Any]:
+    """Some signals and the knots of functions of them, as entries of a shape.
 
     Parameters
     ----------
     signals : Signals
     names : sequence of str
         Signals, joints counted from 1, such as ``"q2"``.
+    count : int
+        Number of knots of each.
 
     Returns
     -------
     dict
-        The names, ``of``, and the ends of their ranges, ``low`` and ``high``, in their units.
+        The names, ``of``, and the ``knots`` of each, in its unit.
     """
-    low, high = zip(*(range_of(signals, name) for name in names), strict=True)
-    return {"of": tuple(names), "low": low, "high": high}
+    knots = tuple(knots_of(signals, name, count) for name in names)
+    return {"of": tuple(names), "knots": knots}
 
 
-def products_of_low_order(
-    signals: Signals,
-    names: Sequence[str],
-    low: Sequence[float],
-    high: Sequence[float],
-    count: int,
+def products_of_hats(
+    signals: Signals, names: Sequence[str], knots: Sequence[Sequence[float]]
 ) -> Array:
-    """Products of functions of some signals, those of the lowest orders.
+    """All products of piecewise linear functions of some signals.
 
     Parameters
     ----------
     signals : Signals
     names : sequence of str
         Signals, joints counted from 1.
-    low, high : sequence of float
-        Their ranges.
-    count : int
-        Number of products.
+    knots : sequence of sequence of float
+        Knots of each.
 
     Returns
     -------
-    ndarray of shape (n_samples, count)
+    ndarray of shape (n_samples, n_products)
     """
-    parts = []
-    for name, *bounds in zip(names, low, high, strict=True):
-        sign = signals.sign[:, int(name[2:]) - 1] if name.startswith("dq") else None
-        parts.append(ordered_functions(signals.named(name), sign, *bounds))
-    orders = [range(p.shape[1]) for p in parts]
-    chosen = sorted(itertools.product(*orders), key=lambda powers: (sum(powers), powers))
-    return np.column_stack(
-        [
-            np.prod([p[:, k] for p, k in zip(parts, powers, strict=True)], axis=0)
-            for powers in chosen[:count]
-        ]
+    return products(
+        [hats(signals.named(name), own) for name, own in zip(names, knots, strict=True)]
     )
 
 
@@ -139,20 +125,21 @@ class FunctionOfSignal(FunctionOfSignals):
     kind = "function_of_signal"
     title = "Function of one signal"
     formula = r"f(s)"
-    coefficients = unnamed_coefficients(HIGHEST_ORDER + 1)
-    n_signals = 1
+    coefficients = unnamed_coefficients(20)
 
 
-class LowOrderOfSignal(FunctionOfSignal):
-    """A function of one signal of any joint in low orders, which few recordings determine.
+class LowOrderOfSignal(FunctionOfSignals):
+    """A coarse function of one signal of any joint, which few recordings determine.
 
-    It is tried for some recordings only: in all of them, the function of higher orders is better.
+    It is tried for some recordings only: in all of them, the finer function is better.
     """
 
-    search = "given"
     kind = "low_order_of_signal"
-    title = "Function of one signal in low orders"
-    coefficients = unnamed_coefficients(4)
+    title = "Coarse function of one signal"
+    formula = r"f(s)"
+    search = "given"
+    n_knots = 5
+    coefficients = unnamed_coefficients(5)
 
 
 class FunctionOfTwoSignals(FunctionOfSignals):
@@ -161,16 +148,18 @@ class FunctionOfTwoSignals(FunctionOfSignals):
     kind = "function_of_two_signals"
     title = "Function of two signals"
     formula = r"f(s_1, s_2)"
-    coefficients = unnamed_coefficients(28)
-    n_signals = 2
+    n_signals, n_knots = 2, 7
+    coefficients = unnamed_coefficients(49)
 
 
-class LowOrderOfTwoSignals(FunctionOfTwoSignals):
-    """A function of two signals of any joints in low orders, which a short log determines."""
+class LowOrderOfTwoSignals(FunctionOfSignals):
+    """A coarse function of two signals of any joints, which a short log determines."""
 
     kind = "low_order_of_two_signals"
-    title = "Function of two signals in low orders"
-    coefficients = unnamed_coefficients(10)
+    title = "Coarse function of two signals"
+    formula = r"f(s_1, s_2)"
+    n_signals, n_knots = 2, 4
+    coefficients = unnamed_coefficients(16)
 
 
 class FunctionOfThreeSignals(FunctionOfSignals):
@@ -179,8 +168,8 @@ class FunctionOfThreeSignals(FunctionOfSignals):
     kind = "function_of_three_signals"
     title = "Function of three signals"
     formula = r"f(s_1, s_2, s_3)"
-    coefficients = unnamed_coefficients(35)
-    n_signals = 3
+    n_signals, n_knots = 3, 4
+    coefficients = unnamed_coefficients(64)
 
 
 class FrictionOverTwoSignals(FunctionOfSignals):
@@ -189,23 +178,18 @@ class FrictionOverTwoSignals(FunctionOfSignals):
     kind = "friction_over_two_signals"
     title = "Dry friction over two signals"
     formula = r"\mathrm{sign}\,\dot q\,f(s_1, s_2)"
-    coefficients = unnamed_coefficients(21)
-    n_signals = 3
+    n_signals, n_knots = 3, 5
+    coefficients = unnamed_coefficients(25)
 
     def admits(self, names: Sequence[str]) -> bool:
         return super().admits(names) and sum(name.startswith("dq") for name in names) == 1
 
     def columns(self, signals: Signals, joint: int, **shape: Any) -> Array:
-        (speed,) = (name for name in shape["of"] if name.startswith("dq"))
-        ranges = zip(shape["of"], shape["low"], shape["high"], strict=True)
-        first, second = (
-            ordered_functions(signals.named(name), None, low, high)
-            for name, low, high in ranges
-            if name != speed
-        )
-        most = HIGHEST_OF_TWO + 1
-        products = [first[:, i] * second[:, k] for i in range(most) for k in range(most - i)]
-        return signals.sign[:, [int(speed[2:]) - 1]] * np.column_stack(products)
+        knots = dict(zip(shape["of"], shape["knots"], strict=True))
+        (speed,) = (name for name in knots if name.startswith("dq"))
+        del knots[speed]
+        free = products_of_hats(signals, [*knots], [*knots.values()])
+        return signals.sign[:, [int(speed[2:]) - 1]] * free
 
 
 class FunctionOfSum(NamelessEffect):

@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals, blocks_held_out
@@ -19,8 +18,6 @@ _OUTSIDE = 0.002
 _REACHING = 3
 #: Share of the range over which the secant is computed that continues a function beyond it.
 _SECANT = 0.15
-#: Highest order of a function of one signal.
-HIGHEST_ORDER = 12
 #: Range of a signal that is more than rounding, as a share of its values.
 _LEAST_RANGE = 1e-9
 
@@ -120,27 +117,82 @@ def continued(functions: Callable[[Array], Array], x: Array, low: float, high: f
     return values
 
 
-def ordered_functions(x: Array, sign: Array | None, low: float, high: float) -> Array:
-    """Functions of one signal by rising order, the constant first, continued as :func:`continued`.
+def knots_of(signals: Signals, name: str, count: int) -> tuple[float, ...]:
+    """Knots of piecewise linear functions of a signal, within its :func:`range_of`.
 
-    Those of a velocity are powers with its direction, smooth around rest.
+    They are two thirds of the way from equal distances to equal numbers of samples between them: a
+    function can change where the signal mostly is, but not only where a joint rests.
+
+    Parameters
+    ----------
+    signals : Signals
+    name : str
+        Signal, joints counted from 1, such as ``"q2"``.
+    count : int
+        Number of knots, the ends of the range included.
+
+    Returns
+    -------
+    tuple of float
+        In the unit of the signal.
     """
-    if sign is None:
-        inside = (2 * x - low - high) / max(high - low, 1e-300)
-        return continued(lambda t: np.asarray(legvander(t, HIGHEST_ORDER)), inside, -1.0, 1.0)
-    v = x / max(-low, high, 1e-300)
-    inside = np.clip(v, -1.0, 1.0)
-    columns = _powers(inside, sign)
-    for side in (-1.0, 1.0):
-        rows = np.flatnonzero(side * v > 1.0)
-        if len(rows):
-            edge, inner = _powers(side * np.array([1.0, 1 - 2 * _SECANT]), np.full(2, side))
-            columns[rows] += np.outer((side * v[rows] - 1.0) / (2 * _SECANT), edge - inner)
+
+    def make() -> tuple[float, ...]:
+        return tuple(knots_between(signals.named(name), *range_of(signals, name), count).tolist())
+
+    key = ("knots", name, count)
+    return signals.once(key, make, of_fit=name.startswith("tau"))  # type: ignore[no-any-return]
+
+
+def knots_between(x: Array, low: float, high: float, count: int) -> Array:
+    """Knots of :func:`knots_of` for values, (n_samples,), in a range, (count,)."""
+    share = np.linspace(0.0, 1.0, count)
+    if not high - low > _LEAST_RANGE * max(abs(low), abs(high)):
+        return low + share  # a signal of one value
+    quantiles = np.quantile(np.clip(x, low, high), share)
+    return np.asarray((2 * quantiles + low + (high - low) * share) / 3)
+
+
+def hats(x: Array, knots: Sequence[float]) -> Array:
+    """Piecewise linear functions that are 1 at one knot and 0 at the others, constant outside.
+
+    They are local: a function drawn to zero is small where there is no data.
+
+    Parameters
+    ----------
+    x : ndarray of shape (n_samples,)
+        Values of a signal.
+    knots : sequence of float
+        Increasing.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_knots)
+        Their sum is 1.
+    """
+    places = np.interp(x, knots, np.arange(len(knots)))
+    below = np.minimum(places.astype(np.int64), max(len(knots) - 2, 0))
+    values, rows = np.zeros((len(x), len(knots))), np.arange(len(x))
+    values[rows, below] = 1.0 - (places - below)
+    if len(knots) > 1:
+        values[rows, below + 1] = places - below
+    return values
+
+
+def products(functions: Sequence[Array]) -> Array:
+    """All products of one function of each of several signals.
+
+    Parameters
+    ----------
+    functions : sequence of ndarray of shape (n_samples, k_i)
+        Functions of each signal.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, k_1 * k_2 * ...)
+        The functions of the last signal change first.
+    """
+    columns, *others = functions
+    for other in others:
+        columns = (columns[:, :, None] * other[:, None, :]).reshape(len(columns), -1)
     return columns
-
-
-def _powers(v: Array, sign: Array) -> Array:
-    size = np.abs(v)
-    powers = [np.ones_like(v), v, sign, size, v * v, v * size, v**3, size**3]
-    powers += [sign * size ** (0.5 * k) for k in range(1, HIGHEST_ORDER - len(powers) + 2)]
-    return np.column_stack(powers)

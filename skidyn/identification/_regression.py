@@ -143,7 +143,7 @@ class Regression:
     def _drawn(self) -> Regression:
         """Add rows in every fold that draw the coefficients of flexible functions to zero."""
         places = TermSum(self.terms).slices(self.n_rigid)
-        flexible = [(own, term) for term, own in places if term.effect.drawn]
+        flexible = [(own, term) for term, own in places if term.effect.softness]
         if not flexible:
             return self
         design, target, folds = [*self.design], [*self.target], [*self.fold]
@@ -153,7 +153,7 @@ class Regression:
                 rows = [np.eye(len(design[j].T))[own]] * self.n_folds
                 for f in range(self.n_folds):
                     squares = (design[j][folds[j] == f, own] ** 2).sum(axis=0)
-                    rows[f] = np.sqrt(term.effect.drawn * squares.max(initial=0.0)) * rows[f]
+                    rows[f] = np.sqrt(term.effect.softness * squares.max(initial=0.0)) * rows[f]
                 more = np.repeat(np.arange(self.n_folds), len(rows[0]))
                 order = np.argsort(np.r_[folds[j], more], kind="stable")
                 folds[j] = np.r_[folds[j], more][order]

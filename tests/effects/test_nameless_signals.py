@@ -15,7 +15,7 @@ def test_a_function_of_signals_follows_their_product_and_no_other(signals, left_
     assert effect.variables(0, shape) == names
     columns = effect.columns(signals, 0, **shape)
     assert left_by(columns, np.prod([signals.named(name) for name in names], axis=0)) < 0.01
-    assert left_by(columns, np.sin(17 * signals.time)) > 0.5
+    assert left_by(columns, np.sin(61 * signals.time)) > 0.5
 
 
 def test_friction_over_two_signals_follows_one_velocity_and_two_others(signals, left_by):
