@@ -153,7 +153,7 @@ def knots_between(x: Array, low: float, high: float, count: int) -> Array:
     return np.asarray((2 * quantiles + low + (high - low) * share) / 3)
 
 
-def hats(x: Array, knots: Sequence[float]) -> Array:
+def hats(x: Array, knots: Sequence[float] | Array) -> Array:
     """Piecewise linear functions that are 1 at one knot and 0 at the others, constant outside.
 
     They are local: a function drawn to zero is small where there is no data.
