@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
+from skidyn.diagnosis._absorbed import left_of, thinned
 from skidyn.diagnosis._changing_sizes import changing_size
 from skidyn.diagnosis._signal_products import (
     LEAST_SHARE,
@@ -78,7 +79,7 @@ class Followed(NamedTuple):
     partly: list[tuple[Factor, tuple[str, ...], int]]
 
 
-def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
+def followed_signals(problem: Problem, joint: int, residual: Array, absorbed: Array) -> Followed:
     """Sets of signals, and sums of positions, on which the residual of a joint may depend.
 
     Parameters
@@ -89,11 +90,13 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
         Joint, from 0.
     residual : ndarray of shape (n_samples,)
         Residual of the model, N m or N.
+    absorbed : ndarray of shape (n_rows_j, k)
+        Directions of the rows of the joint that the model takes in.
     """
     y = average_at_rows(problem, joint, residual)
     step = max(1, -(-len(y) // MOST_ROWS))
     signals = {name: x[::step] for name, x in averaged_signals(problem, joint).items()}
-    y = y[::step]
+    y, absorbed = y[::step], thinned(absorbed, step)
     rows = problem.rows
     own = changing_size(signals, y, rows.trajectory[joint][::step], rows.quarter[joint][::step])
     changing = [] if own is None else [own]
@@ -107,12 +110,12 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
         # other recordings have the same times as what is held out
         since = average_at_rows(problem, joint, problem.signals.since_start)[::step]
         signals, close = signals | {"since_start": since}, close | {"since_start": since}
-    sets = sets_of_signals(signals, y, fold, close)
+    sets = sets_of_signals(signals, y, fold, close, absorbed)
     several = [names for names in sets if len(names) > 1]
-    with_function = [product_with_function(signals, y, fold, names) for names in several]
+    with_function = [product_with_function(signals, y, fold, n, absorbed) for n in several]
     partly = [product for product in with_function if product is not None]
-    pair = product_of_two(signals, y, fold)
-    triple = product_of_three(close, y, fold, pair)
+    pair = product_of_two(signals, y, fold, absorbed)
+    triple = product_of_three(close, y, fold, pair, absorbed)
     products = [product for product in (pair, triple) if product is not None]
     sets += [tuple(sorted({factor.signal for factor in factors})) for factors, _ in products]
     loaded = []
@@ -121,11 +124,11 @@ def followed_signals(problem: Problem, joint: int, residual: Array) -> Followed:
         # friction under load, and a gain that drifts, are in the catalogue
         named = {f"dq{joint + 1}", "since_start"}
         others = {name: x for name, x in signals.items() if name not in named}
-        one = product_with_load(others, load, y, fold)
+        one = product_with_load(others, load, y, fold, absorbed)
         loaded = [] if one is None else [one]
     turning = np.flatnonzero(~problem.signals.prismatic).tolist()
     positions = {k: signals[f"q{k + 1}"] for k in sorted(_nearest(joint, turning))}
-    sums = _by_sums(positions, y, fold)
+    sums = _by_sums(positions, y, fold, absorbed)
     return Followed(list(dict.fromkeys(sets)), sums, products, changing, loaded, partly)
 
 
@@ -139,7 +142,9 @@ def _joint_of(signal: str) -> int:
     return int(signal.lstrip("abcdefghijklmnopqrstuvwxyz")) - 1
 
 
-def _by_sums(positions: dict[int, Array], y: Array, fold: NDArray[np.int64]) -> list[Sum]:
+def _by_sums(
+    positions: dict[int, Array], y: Array, fold: NDArray[np.int64], absorbed: Array
+) -> list[Sum]:
     """The best sums of two and of three positions, if they predict the residual."""
     # waves of a sum are products of those of the positions, as complex numbers
     turned = {k: np.exp(1j * np.outer(q, WAVES)) for k, q in positions.items()}
@@ -157,13 +162,13 @@ def _by_sums(positions: dict[int, Array], y: Array, fold: NDArray[np.int64]) -> 
             np.multiply(first, second, out=into)
             for other in others:
                 into *= other
-        best = _best_block(waves.view(float), y, fold) if sums else None
+        best = _best_block(waves.view(float), y, fold, absorbed) if sums else None
         if best is not None:
             found.append(sums[best])
     return found
 
 
-def _best_block(blocks: Array, y: Array, fold: NDArray[np.int64]) -> int | None:
+def _best_block(blocks: Array, y: Array, fold: NDArray[np.int64], absorbed: Array) -> int | None:
     """The block of columns whose fit predicts held-out folds best, if any does.
 
     Parameters
@@ -171,10 +176,12 @@ def _best_block(blocks: Array, y: Array, fold: NDArray[np.int64]) -> int | None:
     blocks : ndarray of shape (n_blocks, n_rows, k)
     y : ndarray of shape (n_rows,)
     fold : ndarray of shape (n_rows,)
+    absorbed : ndarray of shape (n_rows, m)
+        Directions that the model takes in.
     """
     y = y - y.mean()
-    right, mean = np.moveaxis(np.stack([y, np.full(len(y), 1 / len(y))]) @ blocks, 1, 0)
-    gram = blocks.transpose(0, 2, 1) @ blocks - len(y) * mean[:, :, None] * mean[:, None]
+    blocks = left_of(blocks - blocks.mean(axis=1, keepdims=True), absorbed)
+    right, gram = y @ blocks, blocks.transpose(0, 2, 1) @ blocks
     weights = solved(gram + RIDGE * len(y) * np.eye(blocks.shape[2]), right)
     # No fit predicts held-out rows better than it fits them when they are included.
     gain = np.sum(weights * (2 * right - np.matmul(gram, weights[..., None])[..., 0]), axis=1)
@@ -183,6 +190,6 @@ def _best_block(blocks: Array, y: Array, fold: NDArray[np.int64]) -> int | None:
         return None
     parts = [np.flatnonzero(fold == f) for f in range(int(fold.max()) + 1)]
     energy = np.array([y[rows] @ y[rows] for rows in parts])
-    left = errors_of_folds(blocks[able] - mean[able, None], y, parts, RIDGE)
+    left = errors_of_folds(blocks[able], y, parts, RIDGE)
     best = int(np.argmin(left.sum(1)))
     return int(able[best]) if predictable(energy, left[best]) else None

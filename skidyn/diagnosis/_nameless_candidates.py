@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from skidyn._cores import each
@@ -34,6 +34,7 @@ from skidyn.evidence import Problem
 def nameless_candidates(
     problem: Problem,
     residual: Array,
+    absorbed: Sequence[Array],
     *,
     followed_on: Collection[int] | None = None,
 ) -> list[Candidate]:
@@ -45,6 +46,9 @@ def nameless_candidates(
         Rows and folds.
     residual : ndarray of shape (n_samples, n_joints)
         Residual of the model, N m or N.
+    absorbed : sequence of ndarray of shape (n_rows_j, k_j)
+        Directions that the model takes in, as of
+        :func:`~skidyn.diagnosis._absorbed.absorbed_directions`.
     followed_on : collection of int, optional
         Joints, from 0, for which only functions of signals found from the residual are made; by
         default all unknown functions of all joints.
@@ -60,7 +64,7 @@ def nameless_candidates(
     effects = [e for e in map(get_effect, nameless_kinds()) if e.search != "spectrum"]
 
     def follow(j: int) -> tuple[Followed, dict[str, list[dict[str, Any]]]]:
-        found = followed_signals(problem, j, residual[:, j])
+        found = followed_signals(problem, j, residual[:, j], absorbed[j])
         if followed_on is not None:
             return found, {}
         return found, {e.kind: _waves(problem, e, j, residual) for e in effects}

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from skidyn._last import LastResults
 from skidyn._signals import Array
+from skidyn.diagnosis._absorbed import absorbed_directions
 from skidyn.diagnosis._blocks import variance_inflation
 from skidyn.diagnosis._candidates import Candidate, catalogue_candidates
 from skidyn.diagnosis._held_out import shares_of_folds
@@ -66,7 +67,7 @@ class SearchState:
         self.nameless = nameless and bool(settings.max_findings)
         if self.nameless:
             self._followed = problem.torque - problem.explained(base)
-            self.pool += nameless_candidates(problem, self._followed)
+            self.pool += nameless_candidates(problem, self._followed, self._absorbed)
         self.by_recording = recording_candidates(problem, self.kinds)
         self.n_tests = max(1, len(self.pool) + len(self.by_recording))
         self.whole_pool = self.pool
@@ -95,6 +96,10 @@ class SearchState:
     def terms(self) -> TermSum:
         """Terms of the present model."""
         return self.problem.terms + (c.term for c in self.chosen)
+
+    @property
+    def _absorbed(self) -> list[Array]:
+        return absorbed_directions(self.problem, self.terms, self.fit.noise)
 
     @property
     def blocks(self) -> list[dict[int, Array]]:
@@ -206,7 +211,7 @@ class SearchState:
         self._followed = before.copy()
         self._followed[:, joints] = residual[:, joints]
         known = {c.term for c in self.whole_pool}
-        found = nameless_candidates(self.problem, residual, followed_on=joints)
+        found = nameless_candidates(self.problem, residual, self._absorbed, followed_on=joints)
         new = [c for c in found if c.term not in known]
         self.pool, self.whole_pool = [*self.pool, *new], [*self.whole_pool, *new]
         self.n_tests += len(new)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array
+from skidyn.diagnosis._absorbed import left_of, thinned
 from skidyn.diagnosis._signal_products import LEAST_SHARE, predictable, simple_functions
 from skidyn.effects import Factor, hats, knots_between, products
 
@@ -25,12 +26,15 @@ from skidyn.effects import Factor, hats, knots_between, products
 MOST_ROWS = 1000
 #: Knots of the hats of each signal of a set of one, two and three.
 KNOTS = (20, 7, 4)
-#: Penalty of the squared coefficients, relative to the largest mean square of a column.
+#: Penalty of the squared coefficients, relative to the largest mean square of what is left of a
+#: column.
 RIDGE = 1e-2
 #: Number of the best pairs to which a third signal is added.
 PAIRS = 3
 #: Share of the error of the best smaller set that a further signal must remove.
 FURTHER = 0.1
+#: Least size of what is left of a function, which is about 1.
+TINY = 1e-3
 #: Number of sets whose columns are held at once.
 AT_ONCE = 32
 
@@ -39,7 +43,11 @@ Names = tuple[str, ...]
 
 
 def sets_of_signals(
-    signals: dict[str, Array], y: Array, fold: NDArray[np.int64], near: Collection[str]
+    signals: dict[str, Array],
+    y: Array,
+    fold: NDArray[np.int64],
+    near: Collection[str],
+    absorbed: Array,
 ) -> list[Names]:
     """The best set of one, of two and of three signals, as far as each predicts more.
 
@@ -53,27 +61,31 @@ def sets_of_signals(
         Fold of every row, from 0.
     near : collection of str
         Signals of which all pairs are tried, and thirds; others only with the best single one.
+    absorbed : ndarray of shape (n_rows, m)
+        Directions that the model takes in.
 
     Returns
     -------
     list of tuple of str
         Up to three sets, fewest signals first; empty if none predicts the residual.
     """
-    signals, y, parts = _thinned(signals, y, fold)
+    signals, y, parts, absorbed = _thinned(signals, y, fold, absorbed)
     moving = {name: x for name, x in signals.items() if np.ptp(x) > 0}
     if not moving:
         return []
-    singles = _ranked([(name,) for name in moving], moving, y, parts)
+    singles = _ranked([(name,) for name in moving], moving, y, parts, absorbed)
     first = singles[0][0][0]
     close = [name for name in moving if name in near]
     others = [name for name in moving if name != first and not {name, first} <= {*close}]
     sets = [*itertools.combinations(close, 2), *((first, name) for name in others)]
-    pairs = _ranked(sets, moving, y, parts)
+    pairs = _ranked(sets, moving, y, parts, absorbed)
     energy = np.array([y[rows] @ y[rows] for rows in parts])
     if not any(predictable(energy, ranked[0][1]) for ranked in (singles, pairs) if ranked):
         return []
     more = {frozenset((*pair, name)) for pair, _ in pairs[:PAIRS] for name in close}
-    triples = _ranked(sorted(tuple(sorted(s)) for s in more if len(s) == 3), moving, y, parts)
+    triples = _ranked(
+        sorted(tuple(sorted(s)) for s in more if len(s) == 3), moving, y, parts, absorbed
+    )
     found: list[Names] = []
     most = float(energy.sum())
     for names, left in (ranked[0] for ranked in (singles, pairs, triples) if ranked):
@@ -84,7 +96,11 @@ def sets_of_signals(
 
 
 def product_with_function(
-    signals: dict[str, Array], y: Array, fold: NDArray[np.int64], names: Names
+    signals: dict[str, Array],
+    y: Array,
+    fold: NDArray[np.int64],
+    names: Names,
+    absorbed: Array,
 ) -> tuple[Factor, Names, int] | None:
     """The best product of a simple function of one signal and a free function of the others.
 
@@ -98,6 +114,8 @@ def product_with_function(
         Fold of every row, from 0.
     names : tuple of str
         The two or three signals.
+    absorbed : ndarray of shape (n_rows, m)
+        Directions that the model takes in.
 
     Returns
     -------
@@ -105,33 +123,38 @@ def product_with_function(
         The simple function, the other signals, and the number of products that were tried; None if
         no product predicts the residual.
     """
-    own, y, parts = _thinned({name: signals[name] for name in names}, y, fold)
+    own = {name: signals[name] for name in names}
+    own, y, parts, absorbed = _thinned(own, y, fold, absorbed)
     tried, blocks = [], []
     for name, x in own.items():
         others = tuple(other for other in names if other != name)
-        free = _block([_hats(own[other], KNOTS[len(others)]) for other in others])
+        free = products([_hats(own[other], KNOTS[len(others)]) for other in others])
         for factor in simple_functions(name, x):
             values = factor.of(x)
             tried.append((factor, others))
             blocks.append(values[:, None] / max(np.sqrt(np.mean(values**2)), 1e-300) * free)
-    left = errors_of_folds(np.stack(blocks), y, parts, RIDGE)
+    left = errors_of_folds(_left(np.stack(blocks), absorbed), y, parts, RIDGE)
     best = int(np.argmin(left.sum(1)))
     energy = np.array([y[rows] @ y[rows] for rows in parts])
     return (*tried[best], len(tried)) if predictable(energy, left[best]) else None
 
 
 def _thinned(
-    signals: dict[str, Array], y: Array, fold: NDArray[np.int64]
-) -> tuple[dict[str, Array], Array, list[NDArray[np.int64]]]:
-    """Signals and centred residual at no more rows than are used, and the rows of every fold."""
+    signals: dict[str, Array], y: Array, fold: NDArray[np.int64], absorbed: Array
+) -> tuple[dict[str, Array], Array, list[NDArray[np.int64]], Array]:
+    """Signals and centred residual at no more rows than are used, rows of folds, directions."""
     step = max(1, -(-len(y) // MOST_ROWS))
     y, fold = y[::step] - y[::step].mean(), fold[::step]
     parts = [np.flatnonzero(fold == f) for f in np.unique(fold)]
-    return {name: x[::step] for name, x in signals.items()}, y, parts
+    return {name: x[::step] for name, x in signals.items()}, y, parts, thinned(absorbed, step)
 
 
 def _ranked(
-    sets: Sequence[Names], signals: dict[str, Array], y: Array, parts: Sequence[NDArray[np.int64]]
+    sets: Sequence[Names],
+    signals: dict[str, Array],
+    y: Array,
+    parts: Sequence[NDArray[np.int64]],
+    absorbed: Array,
 ) -> list[tuple[Names, Array]]:
     """Sets of equally many signals with their held-out error of every fold, least error first."""
     if not sets:
@@ -140,7 +163,8 @@ def _ranked(
     left: list[Array] = []
     for start in range(0, len(sets), AT_ONCE):
         some = [[functions[name] for name in names] for names in sets[start : start + AT_ONCE]]
-        left.extend(_errors(np.stack([*map(_block, some)]), y, parts))
+        blocks = _left(np.stack([*map(products, some)]), absorbed)
+        left.extend(_errors(blocks, y, parts))
     return sorted(zip(sets, left, strict=True), key=lambda item: float(item[1].sum()))
 
 
@@ -209,12 +233,16 @@ def solved(gram: Array, right: Array) -> Array:
     return np.asarray(np.linalg.solve(gram, right[..., None])[..., 0])
 
 
+def _left(blocks: Array, absorbed: Array) -> Array:
+    """What a model leaves of blocks of columns, the largest of each with a mean square of 1.
+
+    The ridge must not depend on how much the model takes in.
+    """
+    left = left_of(blocks, absorbed)
+    size = np.sqrt(np.mean(left**2, axis=1).max(axis=1))
+    return np.asarray(left / np.maximum(size, TINY)[:, None, None])
+
+
 def _hats(x: Array, count: int) -> Array:
     """Piecewise linear functions of a signal, shape (n_rows, count)."""
     return hats(x, knots_between(x, float(x.min()), float(x.max()), count))
-
-
-def _block(functions: Sequence[Array]) -> Array:
-    """Products of functions of some signals, of which the largest has a mean square of 1."""
-    block = products(functions)
-    return np.asarray(block / np.sqrt(np.mean(block**2, axis=0).max()))
