@@ -2,9 +2,12 @@
 """False-alarm rate: simulated logs without a hidden effect must be called complete.
 
     python benchmarks/diagnosis/nothing_hidden.py [--logs 200] [--first 0] [--bits 13] [--jobs 2]
+        [--trajectories 1 --duration 3]
 
 Robots, noise, rate, motion and true parameters change from log to log. ``--bits`` rounds the
-positions to as many steps per turn, and those of sliders to a tenth of such a step per m.
+positions to as many steps per turn, and those of sliders to a tenth of such a step per m. A log is
+complete if nothing is found and nothing is left unexplained; logs that are refused as too short are
+counted apart.
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ from skidyn.datasets import (
     make_hidden_effect_log,
 )
 from skidyn.diagnosis import diagnose
+from skidyn.exceptions import LogError
 from skidyn.identification import RBDRegressor
 
 ROBOTS = (load_planar_arm, load_ur5, load_scara, load_srs_arm, load_panda)
@@ -40,16 +44,24 @@ def rounded(log: Bunch, bits: int) -> pd.DataFrame:
     return X
 
 
-def alarm(seed: int, bits: int | None = None) -> list[str]:
-    """Sentences of what was found where nothing is."""
+def alarm(seed: int, bits: int | None = None, **length: float) -> list[str] | None:
+    """Sentences of what was found, or left, where nothing is; None of a log that is refused."""
     warnings.simplefilter("ignore")
     robot = ROBOTS[seed % len(ROBOTS)]()
     noise = ("low", "high")[seed // len(ROBOTS) % 2]
     rate = (100.0, 250.0, 500.0)[seed // 10 % 3]  # the last two are looked at in short windows, too
-    log = make_hidden_effect_log(robot, None, noise=noise, rate=rate, random_state=1000 + seed)
+    log = make_hidden_effect_log(
+        robot, None, noise=noise, rate=rate, random_state=1000 + seed, **length
+    )
     X = rounded(log, bits) if bits else log.X
-    found = diagnose(RBDRegressor(robot), X, log.y).findings
-    return [f"{robot.name}, {noise} noise, {rate:g} Hz, seed {seed}: {f.sentence}" for f in found]
+    try:
+        diagnosis = diagnose(RBDRegressor(robot), X, log.y)
+    except LogError:
+        return None
+    told = [finding.sentence for finding in diagnosis.findings]
+    if diagnosis.verdict != "complete" and not told:
+        told = [f"unexplained on joints {diagnosis.unexplained['joints']}"]
+    return [f"{robot.name}, {noise} noise, {rate:g} Hz, seed {seed}: {text}" for text in told]
 
 
 def main() -> None:
@@ -57,15 +69,23 @@ def main() -> None:
     parser.add_argument("--logs", type=int, default=200)
     parser.add_argument("--first", type=int, default=0, help="seed of the first log")
     parser.add_argument("--bits", type=int, help="resolution of the encoders")
+    parser.add_argument("--trajectories", type=int, help="number of recordings")
+    parser.add_argument("--duration", type=float, help="length of a recording in s")
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
+    length = {"n_trajectories": options.trajectories, "duration": options.duration}
+    length = {name: value for name, value in length.items() if value is not None}
+    seeds = range(options.first, options.first + options.logs)
     results = Parallel(n_jobs=options.jobs)(
-        delayed(alarm)(options.first + k, options.bits) for k in range(options.logs)
+        delayed(alarm)(seed, options.bits, **length) for seed in seeds
     )
-    for sentence in (s for found in results for s in found):
+    answered = [found for found in results if found is not None]
+    for sentence in (s for found in answered for s in found):
         print(sentence)
-    complete = sum(not found for found in results)
-    print(f"complete: {complete} of {options.logs} ({complete / options.logs:.1%})")
+    complete = sum(not found for found in answered)
+    print(f"complete: {complete} of {len(answered)} ({complete / max(len(answered), 1):.1%})")
+    if len(answered) < len(results):
+        print(f"refused: {len(results) - len(answered)} of {len(results)}")
 
 
 if __name__ == "__main__":

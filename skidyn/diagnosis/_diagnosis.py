@@ -485,7 +485,7 @@ FEWEST_WINDOWS = 8
 def _check_rows(problem: Problem, files: Sequence[str] = ()) -> None:
     """Refuse a log, of some files, in which the joints do not move long enough."""
     counts = problem.rows.counts
-    width = len(problem.rigid_index) + sum(term.width for term in problem.terms)
+    width = len(problem.rigid_index) + problem.terms.width
     if max(counts) >= FEWEST_WINDOWS and sum(counts) >= ROWS_PER_COEFFICIENT * width:
         return
     names = list(dict.fromkeys(files))

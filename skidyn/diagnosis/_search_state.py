@@ -210,6 +210,8 @@ class SearchState:
         joints = np.flatnonzero(change > SAME * np.mean(before**2, axis=0)).tolist()
         self._followed = before.copy()
         self._followed[:, joints] = residual[:, joints]
+        if not joints:
+            return
         known = {c.term for c in self.whole_pool}
         found = nameless_candidates(self.problem, residual, self._absorbed, followed_on=joints)
         new = [c for c in found if c.term not in known]

@@ -172,7 +172,8 @@ def _best_triple(
 ) -> tuple[list[int], Array, int]:
     """The three functions whose product removes most, what is left of it, and the number tried.
 
-    What the model takes in is found for the best products with each function only.
+    What the model takes in is found for the best products with each function only. There are none
+    if no product varies.
 
     Parameters
     ----------
@@ -198,8 +199,11 @@ def _best_triple(
         gain = np.where(others, _gains(along, square, mean, len(y)), 0.0)
         among += int(others.sum())
         first = np.argsort(-gain, axis=None, kind="stable")[:TRIPLES]
+        first = first[gain.ravel()[first] > 0.0]
         i, j = np.unravel_index(first, gain.shape)
         tried += [[int(k), *pair] for pair in zip(i.tolist(), j.tolist(), strict=True)]
+    if not tried:
+        return [], np.zeros(len(y)), among
     columns = np.prod([values[:, list(some)] for some in zip(*tried, strict=True)], axis=0)
     columns, gain = _gains_of(columns, y, absorbed)
     best = int(np.argmax(gain))

@@ -40,9 +40,9 @@ class FunctionOfSignals(NamelessEffect):
     found. They are local, so that no recording decides what the function is where it has not been.
     """
 
-    n_signals: ClassVar[int] = 1
-    #: Knots of the functions of each signal.
-    n_knots: ClassVar[int] = 20
+    #: Number of signals, and of knots of the functions of each.
+    n_signals: ClassVar[int]
+    n_knots: ClassVar[int]
     search: ClassVar[Literal["screened", "given"]] = "screened"
     softness = 3e-3
 
@@ -125,7 +125,8 @@ class FunctionOfSignal(FunctionOfSignals):
     kind = "function_of_signal"
     title = "Function of one signal"
     formula = r"f(s)"
-    coefficients = unnamed_coefficients(20)
+    n_signals, n_knots = 1, 20
+    coefficients = unnamed_coefficients(n_knots)
 
 
 class LowOrderOfSignal(FunctionOfSignals):
@@ -138,8 +139,8 @@ class LowOrderOfSignal(FunctionOfSignals):
     title = "Coarse function of one signal"
     formula = r"f(s)"
     search = "given"
-    n_knots = 5
-    coefficients = unnamed_coefficients(5)
+    n_signals, n_knots = 1, 5
+    coefficients = unnamed_coefficients(n_knots)
 
 
 class FunctionOfTwoSignals(FunctionOfSignals):
@@ -149,7 +150,7 @@ class FunctionOfTwoSignals(FunctionOfSignals):
     title = "Function of two signals"
     formula = r"f(s_1, s_2)"
     n_signals, n_knots = 2, 7
-    coefficients = unnamed_coefficients(49)
+    coefficients = unnamed_coefficients(n_knots**2)
 
 
 class LowOrderOfTwoSignals(FunctionOfSignals):
@@ -159,7 +160,7 @@ class LowOrderOfTwoSignals(FunctionOfSignals):
     title = "Coarse function of two signals"
     formula = r"f(s_1, s_2)"
     n_signals, n_knots = 2, 4
-    coefficients = unnamed_coefficients(16)
+    coefficients = unnamed_coefficients(n_knots**2)
 
 
 class FunctionOfThreeSignals(FunctionOfSignals):
@@ -169,7 +170,7 @@ class FunctionOfThreeSignals(FunctionOfSignals):
     title = "Function of three signals"
     formula = r"f(s_1, s_2, s_3)"
     n_signals, n_knots = 3, 4
-    coefficients = unnamed_coefficients(64)
+    coefficients = unnamed_coefficients(n_knots**3)
 
 
 class FrictionOverTwoSignals(FunctionOfSignals):
@@ -179,7 +180,7 @@ class FrictionOverTwoSignals(FunctionOfSignals):
     title = "Dry friction over two signals"
     formula = r"\mathrm{sign}\,\dot q\,f(s_1, s_2)"
     n_signals, n_knots = 3, 5
-    coefficients = unnamed_coefficients(25)
+    coefficients = unnamed_coefficients(n_knots**2)
 
     def admits(self, names: Sequence[str]) -> bool:
         return super().admits(names) and sum(name.startswith("dq") for name in names) == 1

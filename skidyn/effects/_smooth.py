@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Smooth functions of a signal on the range that it covers, continued beyond it."""
+"""Smooth and piecewise linear functions of a signal on the range that it covers, and beyond it."""
 
 from __future__ import annotations
 

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
+from skidyn.effects import hats
 from skidyn.measurement._loads import LOAD, by_recording, n_loads, span
 from skidyn.measurement._outcome import Outcome
 from skidyn.measurement._reading import Reading
@@ -599,4 +600,4 @@ def lines_between(position: Array) -> Array:
         They sum to 1.
     """
     nodes = np.unique(np.quantile(position, np.linspace(0, 1, PLACES)))
-    return np.stack([np.interp(position, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
+    return hats(position, nodes)

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_panda, load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.exceptions import LogError, LogWarning
 from skidyn.explorer import Session
@@ -281,6 +281,12 @@ def test_a_short_log_is_refused_with_its_file_and_what_it_lacks():
     X.attrs["files"] = ["short.csv"]
     with pytest.raises(LogError, match=r"^short.csv: no joint.*0.49 s in 1 traj.*8 are needed"):
         diagnose(RBDRegressor(log.robot), X, log.y)
+
+
+def test_a_log_with_fewer_rows_than_its_model_needs_is_refused():
+    log = make_hidden_effect_log(load_panda(), None, n_trajectories=1, duration=1.6)
+    with pytest.raises(LogError, match=r"1.59 s in 1 traj.*windows away from rest.*; 1\d\d are"):
+        diagnose(RBDRegressor(log.robot), log.X, log.y)
 
 
 @pytest.mark.parametrize("model", [None, pd.DataFrame({"q1": [0.0]})])

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from skidyn.datasets import load_planar_arm, load_ur5, make_hidden_effect_log
+from skidyn.datasets import load_panda, load_planar_arm, load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
 from skidyn.identification import RBDRegressor
 
@@ -158,6 +158,19 @@ def test_a_form_in_no_catalogue_is_unknown_and_its_signals_are_named(forms):
             proposal = diagnosis.unknowns[0].proposal
             assert proposal.expressions == (formula,)
             assert proposal.coefficients[0] == pytest.approx(size, rel=0.1)
+
+
+def test_signals_are_found_of_a_torque_that_bodies_mostly_take_in():
+    robot = load_panda()
+    log = make_hidden_effect_log(robot, None, n_trajectories=6, duration=5.0, random_state=24)
+    q4, q6 = (log.X[name] - log.X[name].median() for name in ("q4", "q6"))
+    y = np.array(log.y, dtype=float)
+    y[:, 1] += 8.0 * np.maximum(q4 - 0.1, 0.0) * q6
+
+    diagnosis = diagnosed(log, y)
+
+    assert diagnosis.findings[0].joints == (2,)
+    assert set(diagnosis.findings[0].variables) == {"q4", "q6"}
 
 
 @pytest.mark.slow

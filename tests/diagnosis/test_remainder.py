@@ -49,6 +49,16 @@ def test_slow_remainder_of_a_thousandth_of_the_range_is_not_told(log, wandering)
     assert found.verdict == "complete"
 
 
+def test_a_log_that_does_not_determine_the_model_has_no_remainder():
+    log = make_hidden_effect_log(
+        load_scara(), None, noise="high", n_trajectories=1, duration=3.0, random_state=707
+    )
+    found = diagnose(RBDRegressor(log.robot), log.X, log.y, checks=())
+    assert found.rmse_after[2] > 2 * found.noise[2]
+    assert found.verdict == "complete"
+    assert any("is due to extrapolation" in note for note in found.warnings)
+
+
 @pytest.fixture(scope="module")
 def with_coloured_noise():
     """A Panda with nothing hidden and noise that is correlated over some tenths of a second."""

@@ -6,6 +6,7 @@ import pytest
 
 from skidyn.datasets import load_ur5, make_hidden_effect_log
 from skidyn.diagnosis import diagnose
+from skidyn.diagnosis._signal_products import product_of_three
 from skidyn.identification import RBDRegressor
 
 SHORT = {"n_trajectories": 6, "duration": 4.0}
@@ -46,6 +47,16 @@ def test_a_product_is_found_in_a_short_log(torque, signals):
     (finding,) = diagnosis.findings
     assert (diagnosis.verdict, finding.joints) == ("unknown", (4,))
     assert set(finding.variables) == signals
+
+
+def test_a_product_of_three_has_three_signals():
+    """The square of a signal times another one, which removes more, is no product of three."""
+    x, y, z = np.random.default_rng(0).normal(size=(3, 400)).cumsum(axis=1)
+    signals = {"ddq1": x - x.mean(), "ddq2": y - y.mean(), "ddq3": z - z.mean()}
+    torque = signals["ddq1"] * signals["ddq3"] * signals["ddq3"]
+    fold = np.repeat(np.arange(8), 50)
+    found = product_of_three(signals, torque, fold, None, np.zeros((400, 0)))
+    assert found is None or len({factor.signal for factor in found[0]}) == 3
 
 
 @pytest.mark.slow
