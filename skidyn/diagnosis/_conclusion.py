@@ -116,7 +116,8 @@ def conclude(
     remarks += unlisted
     share = predictable_share(problem, result.fit.residual)
     rmse = np.array(judged.history[-1]["rmse"])
-    parts = find_remainder(problem, result.fit, judged.noise, torque, rmse, share)
+    where = judged.comparisons[-1].judged_samples
+    parts = find_remainder(problem, result.fit, judged.noise, torque, where, rmse, share)
     findings += _in_time(judged, parts, torque, sliding)
     ends = np.array(judged.history[0]["rmse"]), rmse
     whole = problem.whole_trajectories

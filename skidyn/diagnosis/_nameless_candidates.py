@@ -85,7 +85,8 @@ def nameless_candidates(
             shapes += [(shape, 1) for shape in waves.get(effect.kind, ())]
             for shape, among in shapes:
                 term = Term.at(effect.kind, joints, shape)
-                if term.width * ROWS_PER_COEFFICIENT <= problem.rows.counts[joint]:
+                free = problem.rows.counts[joint] - absorbed[joint].shape[1]
+                if term.width * ROWS_PER_COEFFICIENT <= free:
                     made.append((term, effect.variables(joint, shape), among))
     all_rows = problem.prepare([term for term, *_ in made], screening=True)
     return [

@@ -26,7 +26,6 @@ from skidyn.diagnosis._rule import (
     REMAINDER_SLOW_SHARE_OF_RANGE,
     REMAINDER_SLOW_TIMES_NOISE,
     REMAINDER_TIMES_NOISE,
-    SELDOM_SHARE_OF_FOLDS,
     SLOW_ALIKE,
 )
 from skidyn.evidence import Fit, Problem, smooth_motion
@@ -62,9 +61,8 @@ class Remainder:
         Whether the error exceeds the fast noise by a similar factor on all joints, as noise that is
         correlated in time does; a missing torque is larger on some joints than on others.
     extrapolated : ndarray of shape (n_joints,) of bool or None
-        Joints that slide in few recordings only, or all of a log of few recordings, whose torque
-        the model explains up to noise if it is fitted to all: their held-out error is due to
-        extrapolation.
+        Joints whose torque the model explains up to noise if it is fitted to the whole log: their
+        held-out error is due to extrapolation.
 
     Examples
     --------
@@ -109,6 +107,7 @@ def find_remainder(
     fit: Fit,
     noises: tuple[Array, Array, Array],
     torque: Array,
+    judged: NDArray[np.bool_],
     rmse: Array,
     share: Array,
 ) -> Remainder:
@@ -125,8 +124,10 @@ def find_remainder(
         (:func:`position_noises`).
     torque : ndarray of shape (n_samples, n_joints), N m or N
         Measured torque.
+    judged : ndarray of shape (n_samples, n_joints) of bool
+        Samples on which effects are judged.
     rmse : ndarray of shape (n_joints,), N m or N
-        Held-out error on the samples judged.
+        Held-out error on these.
     share : ndarray of shape (n_joints,)
         Share of the squared error of averaged rows that is predictable.
     """
@@ -137,6 +138,11 @@ def find_remainder(
     left = np.sqrt(np.maximum(excess - predictable**2, 0.0))
     span = torque_range(torque)
     material = (rmse > REMAINDER_TIMES_NOISE * noise) & (left > REMAINDER_SHARE_OF_RANGE * span)
+    extrapolated = np.zeros_like(material)
+    if material.any():
+        fitted = _error_of_fit(problem, fit, judged)
+        extrapolated = material & (fitted <= REMAINDER_TIMES_NOISE * noise)
+        material &= ~extrapolated
     rows = np.array([root_mean_square(e) for e in averaged])
     inflation = variance_inflation(problem, averaged, range(len(averaged)))
     # averaged rows have the scale of white noise, which that of positions is not
@@ -148,22 +154,21 @@ def find_remainder(
     if coloured:
         material[:] = False
     material |= (predictable > noise) & (predictable > REMAINDER_PREDICTABLE_SHARE * span)
-    # what the coefficients took of the noise of these rows is not explained
-    n_rows = sum(map(len, averaged))
-    fitted = rows * np.sqrt(n_rows / max(n_rows - len(fit.coefficients), 1))
-    beyond = _seldom(problem) | (not problem.whole_trajectories)
-    extrapolated = material & beyond & (fitted <= REMAINDER_TIMES_NOISE * noise)
-    material &= ~extrapolated
+    extrapolated &= ~material
     return Remainder(
         sensor, position, predictable, left, inflation, material, coloured, extrapolated
     )
 
 
-def _seldom(problem: Problem) -> NDArray[np.bool_]:
-    """Joints most of whose rows lie in a few of the folds."""
-    shares = [np.bincount(f, minlength=problem.n_folds) / max(len(f), 1) for f in problem.fold]
-    folds = np.array([1 / max(float(np.sum(s**2)), 1e-12) for s in shares])
-    return np.asarray(folds < SELDOM_SHARE_OF_FOLDS * problem.n_folds)
+def _error_of_fit(problem: Problem, fit: Fit, judged: NDArray[np.bool_]) -> Array:
+    """Error of a fit on the samples judged of the log that it was fitted to, (n_joints,).
+
+    It includes what the coefficients took of the noise of averaged rows.
+    """
+    square = np.where(judged, (problem.torque - problem.explained(fit)) ** 2, 0.0).sum(0)
+    n_rows = sum(map(len, fit.residual))
+    taken = n_rows / max(n_rows - len(fit.coefficients), 1)
+    return np.asarray(np.sqrt(square / np.maximum(judged.sum(0), 1) * taken))
 
 
 def _is_alike(errors: Array, noise: Array, factor: float, most: float = np.inf) -> bool:

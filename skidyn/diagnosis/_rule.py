@@ -71,8 +71,8 @@ FEW_WAVES = 4.0
 HARMONIC = 0.03
 #: Multiple of the log-likelihood that the best sine gains from which ripple has another form.
 NO_SINE = 1.1
-#: Rows that a log must have for each coefficient of the model, and those of a joint for each
-#: coefficient of an unknown function: with fewer, what is held out is extrapolated.
+#: Rows that a log must have for each coefficient of the model, and those of a joint that the model
+#: leaves for each coefficient of an unknown function: with fewer, what is held out is extrapolated.
 ROWS_PER_COEFFICIENT = 2
 #: A column of which less than this share is new to the model is not tested.
 NEW_SHARE = 1e-6
@@ -212,9 +212,6 @@ REMAINDER_TIMES_NOISE, REMAINDER_SHARE_OF_RANGE = 2.0, 0.02
 #: torque more than that of coloured noise; and they reach this share of the range.
 REMAINDER_SLOW_TIMES_NOISE, REMAINDER_CORRELATED = 3.0, 2.2
 REMAINDER_SLOW_SHARE_OF_RANGE = 0.01
-#: A joint whose rows lie in effectively fewer than this share of the folds has to be extrapolated
-#: where one of these is left out: its remainder is that of the fit to all folds.
-SELDOM_SHARE_OF_FOLDS = 0.5
 #: Errors that are at most this multiple of the fast noise on every joint, and equal within this
 #: factor on all of at least this many joints, are noise that is correlated in time.
 COLOURED_MOST, COLOURED_ALIKE, COLOURED_FEWEST_JOINTS = 4.0, 1.5, 3

@@ -15,6 +15,8 @@ from skidyn.effects import Factor
 
 #: Least share of the squared residual that must be predictable, and largest p-value.
 LEAST_SHARE, CHANCE = 0.03, 0.05
+#: Share from which on it may be predictable in few folds, those in which the torque acts.
+MOST_SHARE = 0.5
 #: A product must remove this share of the squared residual.
 WORTH = 0.05
 #: A product that varies by a smaller share of its squares counts as constant, and one of which the
@@ -34,10 +36,11 @@ Product = tuple[tuple[Factor, ...], int]
 
 
 def predictable(before: Array, after: Array) -> bool:
-    """Whether a learner reduces the squared errors of held-out folds significantly.
+    """Whether a learner reduces the squared errors of held-out folds significantly, or to a half.
 
     The gain of a fold is relative to its own error and that of an average fold, so that neither a
-    single fold with large errors nor one without predictable error decides.
+    single fold with large errors nor one without predictable error decides. A torque that hardly
+    acts in most of the folds is not significant in this way, however well it is predicted.
 
     Parameters
     ----------
@@ -45,8 +48,13 @@ def predictable(before: Array, after: Array) -> bool:
         Squared error of every fold without and with the learner.
     """
     gain = (before - after) / np.maximum(np.maximum(before, after) + before.mean(), 1e-300)
-    enough = bool(after.sum() < (1 - LEAST_SHARE) * before.sum())
-    return enough and float(ttest_1samp(gain, 0.0, alternative="greater").pvalue) < CHANCE
+    share = 1 - after.sum() / max(float(before.sum()), 1e-300)
+    if share > MOST_SHARE:
+        return True
+    return (
+        bool(share > LEAST_SHARE)
+        and float(ttest_1samp(gain, 0.0, alternative="greater").pvalue) < CHANCE
+    )
 
 
 def by_fold(values: Array, fold: NDArray[np.int64]) -> Array:

@@ -6,7 +6,13 @@ import pandas as pd
 import pytest
 from scipy.signal import lfilter
 
-from skidyn.datasets import load_panda, load_planar_arm, load_scara, make_hidden_effect_log
+from skidyn.datasets import (
+    load_panda,
+    load_planar_arm,
+    load_scara,
+    load_ur5,
+    make_hidden_effect_log,
+)
 from skidyn.diagnosis import Settings, diagnose
 from skidyn.identification import RBDRegressor
 
@@ -57,6 +63,17 @@ def test_a_log_that_does_not_determine_the_model_has_no_remainder():
     assert found.rmse_after[2] > 2 * found.noise[2]
     assert found.verdict == "complete"
     assert any("is due to extrapolation" in note for note in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("load", "noise", "seed"), [(load_ur5, "low", 340021), (load_panda, "high", 342039)]
+)
+def test_nothing_is_left_in_a_short_log_at_a_high_rate(load, noise, seed):
+    """Their noise is correlated over some samples, and averaged rows have more than its share."""
+    log = make_hidden_effect_log(
+        load(), None, noise=noise, rate=500.0, n_trajectories=1, duration=3.0, random_state=seed
+    )
+    assert diagnose(RBDRegressor(log.robot), log.X, log.y, checks=()).verdict == "complete"
 
 
 @pytest.fixture(scope="module")

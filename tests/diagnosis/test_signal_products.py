@@ -59,6 +59,24 @@ def test_a_product_of_three_has_three_signals():
     assert found is None or len({factor.signal for factor in found[0]}) == 3
 
 
+def test_a_product_that_acts_in_two_of_many_recordings_is_found():
+    rng = np.random.default_rng(1)
+    fold = np.repeat(np.arange(12), 40)
+    time, names = np.arange(480) / 20, ("ddq1", "ddq2", "ddq3", "dq2", "dq3")
+    signals = {
+        name: np.sin(f * time + f) for name, f in zip(names, (2, 3.1, 4.3, 5.7, 1.3), strict=True)
+    }
+    signals["ddq1"] *= np.where(fold < 2, 1.0, 0.02)  # joint 1 hardly moves in the others
+    torque = signals["ddq1"] * signals["ddq2"] * signals["dq3"]
+    noise = rng.normal(0, 0.1, 480)
+    found = product_of_three(signals, torque + noise, fold, None, np.zeros((480, 0)))
+    assert found is not None
+    assert {factor.signal for factor in found[0]} == {"ddq1", "ddq2", "dq3"}
+    alone = torque * (fold == 0)  # that no other recording confirms
+    found = product_of_three(signals, alone + noise, fold, None, np.zeros((480, 0)))
+    assert found is None or {factor.signal for factor in found[0]} != {"ddq1", "ddq2", "dq3"}
+
+
 @pytest.mark.slow
 def test_a_product_of_signals_that_do_nothing_alone_is_followed():
     log = make_hidden_effect_log(load_ur5(), None, random_state=3, **SHORT)
