@@ -116,8 +116,7 @@ def conclude(
     remarks += unlisted
     share = predictable_share(problem, result.fit.residual)
     rmse = np.array(judged.history[-1]["rmse"])
-    where = judged.comparisons[-1].judged_samples
-    parts = find_remainder(problem, result.fit, judged.noise, torque, where, rmse, share)
+    parts = find_remainder(problem, result.fit, judged.noise, judged.comparisons[-1], share)
     findings += _in_time(judged, parts, torque, sliding)
     ends = np.array(judged.history[0]["rmse"]), rmse
     whole = problem.whole_trajectories

@@ -81,11 +81,11 @@ def nameless_candidates(
             if followed_on is not None and (effect.search != "screened" or joint not in followed):
                 continue
             own, waves = followed[joint]
+            free = problem.rows.counts[joint] - absorbed[joint].shape[1]
             shapes = _shapes(problem, effect, joints, own)
             shapes += [(shape, 1) for shape in waves.get(effect.kind, ())]
             for shape, among in shapes:
                 term = Term.at(effect.kind, joints, shape)
-                free = problem.rows.counts[joint] - absorbed[joint].shape[1]
                 if term.width * ROWS_PER_COEFFICIENT <= free:
                     made.append((term, effect.variables(joint, shape), among))
     all_rows = problem.prepare([term for term, *_ in made], screening=True)

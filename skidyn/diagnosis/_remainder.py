@@ -8,13 +8,14 @@ logged signals still explain. The remainder is neither.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidyn._signals import Array, Signals
 from skidyn.diagnosis._blocks import variance_inflation
+from skidyn.diagnosis._comparison import Comparison
 from skidyn.diagnosis._noise import as_measured, sensor_noise
 from skidyn.diagnosis._rule import (
     COLOURED_ALIKE,
@@ -106,9 +107,7 @@ def find_remainder(
     problem: Problem,
     fit: Fit,
     noises: tuple[Array, Array, Array],
-    torque: Array,
-    judged: NDArray[np.bool_],
-    rmse: Array,
+    comparison: Comparison,
     share: Array,
 ) -> Remainder:
     """Split the error of the completed model by cause.
@@ -122,25 +121,22 @@ def find_remainder(
     noises : tuple of three ndarrays of shape (n_joints,), N m or N
         Noise of the torque sensor, of positions, and of these in averaged rows
         (:func:`position_noises`).
-    torque : ndarray of shape (n_samples, n_joints), N m or N
-        Measured torque.
-    judged : ndarray of shape (n_samples, n_joints) of bool
-        Samples on which effects are judged.
-    rmse : ndarray of shape (n_joints,), N m or N
-        Held-out error on these.
+    comparison : Comparison
+        Measured torque and its held-out prediction by this model.
     share : ndarray of shape (n_joints,)
         Share of the squared error of averaged rows that is predictable.
     """
     (sensor, position, slow_position), averaged = noises, fit.residual
     noise = np.hypot(np.nan_to_num(sensor), position)
+    rmse = comparison.rmse(judged=True)
     excess = np.maximum(rmse**2 - noise**2, 0.0)
     predictable = np.sqrt(np.minimum(share * rmse**2, excess))
     left = np.sqrt(np.maximum(excess - predictable**2, 0.0))
-    span = torque_range(torque)
+    span = torque_range(comparison.measured)
     material = (rmse > REMAINDER_TIMES_NOISE * noise) & (left > REMAINDER_SHARE_OF_RANGE * span)
     extrapolated = np.zeros_like(material)
     if material.any():
-        fitted = _error_of_fit(problem, fit, judged)
+        fitted = _error_of_fit(problem, fit, comparison)
         extrapolated = material & (fitted <= REMAINDER_TIMES_NOISE * noise)
         material &= ~extrapolated
     rows = np.array([root_mean_square(e) for e in averaged])
@@ -160,15 +156,16 @@ def find_remainder(
     )
 
 
-def _error_of_fit(problem: Problem, fit: Fit, judged: NDArray[np.bool_]) -> Array:
-    """Error of a fit on the samples judged of the log that it was fitted to, (n_joints,).
+def _error_of_fit(problem: Problem, fit: Fit, comparison: Comparison) -> Array:
+    """Error of a fit on the samples judged of the log that it was fitted to, (n_joints,), N m or N.
 
     It includes what the coefficients took of the noise of averaged rows.
     """
-    square = np.where(judged, (problem.torque - problem.explained(fit)) ** 2, 0.0).sum(0)
+    residual = problem.torque - problem.explained(fit)
+    fitted = replace(comparison, predicted=comparison.measured - residual)
     n_rows = sum(map(len, fit.residual))
     taken = n_rows / max(n_rows - len(fit.coefficients), 1)
-    return np.asarray(np.sqrt(square / np.maximum(judged.sum(0), 1) * taken))
+    return np.asarray(fitted.rmse(judged=True) * np.sqrt(taken))
 
 
 def _is_alike(errors: Array, noise: Array, factor: float, most: float = np.inf) -> bool:

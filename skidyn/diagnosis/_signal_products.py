@@ -47,14 +47,11 @@ def predictable(before: Array, after: Array) -> bool:
     before, after : ndarray of shape (n_folds,)
         Squared error of every fold without and with the learner.
     """
-    gain = (before - after) / np.maximum(np.maximum(before, after) + before.mean(), 1e-300)
     share = 1 - after.sum() / max(float(before.sum()), 1e-300)
-    if share > MOST_SHARE:
-        return True
-    return (
-        bool(share > LEAST_SHARE)
-        and float(ttest_1samp(gain, 0.0, alternative="greater").pvalue) < CHANCE
-    )
+    if not LEAST_SHARE < share <= MOST_SHARE:
+        return bool(share > MOST_SHARE)
+    gain = (before - after) / np.maximum(np.maximum(before, after) + before.mean(), 1e-300)
+    return float(ttest_1samp(gain, 0.0, alternative="greater").pvalue) < CHANCE
 
 
 def by_fold(values: Array, fold: NDArray[np.int64]) -> Array:
