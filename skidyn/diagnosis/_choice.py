@@ -243,6 +243,8 @@ class ChoosingSearch(RankingSearch):
             if errors.shape != best.errors.shape:
                 errors = self._errors(rival, within=single)
             left_over = self.settings.further_tolerance if rival.is_further_form else None
+            if family_of(rival):
+                left_over = 1 - self.settings.family_share
             if self._good_enough(errors.sum(0), left, removed, joints, left_over):
                 return rival
         return best

@@ -113,7 +113,15 @@ def conclude(
         remarks.append(remark)
     unknowns = _unknowns(problem, result, judged.terms)
     findings, unlisted = _listed(judged, shown, unknowns)
-    remarks += unlisted
+    again = partial(conclude, settings=settings, model=model, data=data, withdrawn=True)
+    for k, hypothesis in enumerate(result.findings):
+        terms = [c for c in hypothesis.candidates if c.term in unlisted]
+        drops = [drop_of(shown[k], shown[k + 1], tuple(c.rows)) for c in terms]
+        if terms and hypothesis.torque is None and max(drops) > MUCH:
+            # What it removes is part of the error, though its name is uncertain.
+            rest, notes = without(problem, result, hypothesis, terms), [*notes, *unlisted.values()]
+            return again(problem, rest, limits, sliding, torque, notes)
+    remarks += dict.fromkeys(unlisted.values())
     share = predictable_share(problem, result.fit.residual)
     rmse = np.array(judged.history[-1]["rmse"])
     parts = find_remainder(problem, result.fit, judged.noise, judged.comparisons[-1], share)
@@ -148,7 +156,7 @@ def conclude(
     if wrong is None:
         return diagnosis
     rest = without(problem, result, *wrong)
-    other = conclude(problem, rest, limits, sliding, torque, notes, settings, model, data, True)
+    other = again(problem, rest, limits, sliding, torque, notes)
     # "Nothing is missing" would be wrong: something is, and this is the most likely name.
     only = len(result.findings) == 1 and other.verdict == "complete"
     return diagnosis if only and max(f.error_drop for f in findings) > MUCH else other
@@ -156,7 +164,7 @@ def conclude(
 
 def _listed(
     judged: Judged, shown: Sequence[Any], unknowns: Sequence[UnknownTorque]
-) -> tuple[list[Finding], list[str]]:
+) -> tuple[list[Finding], dict[Term, str]]:
     """Findings, one for every term, and remarks on those that are too small to be listed."""
     problem, result = judged.problem, judged.result
     intervals = parameter_intervals(problem, judged.terms, result.fit.noise)
@@ -181,7 +189,7 @@ def _listed(
             )
             finding.curves.extend(curves)
             findings.append(finding)
-    return findings, list(dict.fromkeys(unlisted.values()))
+    return findings, unlisted
 
 
 def _in_time(

@@ -11,13 +11,16 @@ step could be arbitrarily large.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
 from skidyn._signals import Array
-from skidyn.diagnosis._held_out import bases_alone
+from skidyn.diagnosis._held_out import bases_alone, folds_alone
+from skidyn.diagnosis._profile import QUARTERS
 from skidyn.effects import Shape, Term, TermSum
 from skidyn.evidence import (
     Problem,
@@ -34,6 +37,27 @@ STEP, LARGEST_CHANGE, SMALLER = 0.02, 0.3, 8.0
 #: Largest logarithm of the ratio of an end of an interval to the value: nearly any size is
 #: possible.
 LARGEST_LOG = 7.0
+
+
+@dataclass(frozen=True)
+class _Quarters:
+    """Interleaved parts of all recordings as folds."""
+
+    fold: list[NDArray[np.int64]]
+    n_folds: int = QUARTERS
+
+
+def _products_of_quarters(
+    problem: Problem, design: Sequence[Array], sigma: Array
+) -> tuple[Array, Array]:
+    """As :func:`fold_products`, of interleaved parts of all recordings."""
+    quarter, target = problem.rows.quarter, problem.target
+    orders = [np.argsort(own, kind="stable") for own in quarter]
+    sorted_rows = (
+        [x[order] for x, order in zip(of, orders, strict=True)] for of in (quarter, design, target)
+    )
+    fold, columns, torque = sorted_rows
+    return fold_products(_Quarters(fold), columns, sigma, torque)
 
 
 def parameter_intervals(
@@ -70,14 +94,20 @@ def parameter_intervals(
     at = len(whole)
     slopes, owners, spread = _slopes(problem, places if shapes else [], whole)
     design = problem.design([*blocks, *slopes])
+    known = np.zeros(at + len(spread))
+    known[at:] = 1 / np.square(spread)
+    prior = np.diag(known), np.zeros(len(known))
     grams, cross = fold_products(problem, design, sigma, problem.target)
-    known = np.zeros(len(cross[0]))
-    known[len(known) - len(spread) :] = 1 / np.square(spread)
     stay = bases_alone(grams, terms, len(spread))
-    full, left = solve_left_out(grams, cross, (np.diag(known), np.zeros(len(known))), kept=stay)
+    full, left_out = solve_left_out(grams, cross, prior, kept=stay)
+    # What acts in one fold only is judged by parts of all of them (``_acceptance.py``).
+    confined = [t.trajectories is None and folds_alone(problem, t).any() for t in terms]
+    if any(confined):
+        _, in_parts = solve_left_out(*_products_of_quarters(problem, design, sigma), prior)
     result = {}
     for i, (term, own) in enumerate(places):
-        apart = _half_width(held[:, own]) < np.abs(whole[own])
+        left = in_parts if confined[i] else left_out
+        apart = _half_width((left if confined[i] else held)[:, own]) < np.abs(whole[own])
         # what others are divided by is zero if it may be zero
         has_value = np.array([not c.is_divisor for c in term.coefficients]) | apart
         fitted = np.where(has_value, whole[own], 0.0)

@@ -18,7 +18,7 @@ from skidyn._signals import Array
 from skidyn._text import inside
 from skidyn.diagnosis._candidates import Candidate
 from skidyn.diagnosis._chance import degrees_of_freedom, least_significant
-from skidyn.diagnosis._rule import Settings
+from skidyn.diagnosis._rule import ROUNDING, Settings
 from skidyn.effects import get_effect, searched_kinds
 from skidyn.evidence import (
     Felt,
@@ -187,10 +187,10 @@ def find_limits(
         least = needed(joint, candidate.width + candidate.n_shapes, free)
         size = least / np.sqrt(swept) if swept > NEW_SHARE * own else np.inf
         # A size larger than the whole torque is not a limit, nor a torque beyond its range, of
-        # which the motion contains a negligible part.
+        # which the motion contains a negligible part, nor a ratio to a load that is rounding error.
         unit = candidate.term.effect.coefficients[0].unit
-        beyond = unit == "N m" and size > span[joint]
-        return float(size if size**2 * own < power[joint] and not beyond else np.inf)
+        most = {"N m": span[joint], "1": 1 / ROUNDING}.get(unit, np.inf)
+        return float(size if size**2 * own < power[joint] and size <= most else np.inf)
 
     single = [c for c in candidates if len(c.joints) == 1 and not c.term.effect.nameless]
     single = [c for c in single if not c.term.effect.coefficients[0].is_share]

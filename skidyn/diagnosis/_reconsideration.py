@@ -450,7 +450,9 @@ class ReconsideringSearch(DuellingSearch):
                 if judged is None or judged.joints != old.joints:
                     self.chosen += old.candidates
                     continue
-                margin = max(0.0, 1 - old.score / same.score)
+                # members of a family are no rivals
+                related = family_of(old) == family_of(same) != ""
+                margin = old.margin if related else max(0.0, 1 - old.score / same.score)
                 new = ranked_with(replace(judged, margin=margin), [old, *old.others])
                 self.chosen += new.candidates
                 self.findings[place] = new
@@ -465,14 +467,29 @@ class ReconsideringSearch(DuellingSearch):
         """
         alike = get_effect(kind).family == family_of(finding) != ""
         share = NEARLY if alike else 1 - self.settings.simpler_share
+
+        def of_kind(own: Hypothesis) -> list[Hypothesis]:
+            return [h for h in own.others if h.kind == kind and h.joints == own.joints]
+
         # a term that was found together with those of other joints was compared alone
-        near = [
-            h
-            for own in (finding, *(own for own in finding.alone if own.joints == finding.joints))
-            for h in own.others
-            if h.kind == kind and h.joints == finding.joints and h.score >= share * own.score
-        ]
-        return max(near, key=lambda h: h.score, default=None)
+        same = [own for own in finding.alone if own.joints == finding.joints]
+        near = [h for own in (finding, *same) for h in of_kind(own) if h.score >= share * own.score]
+        if near or len(finding.joints) == 1:
+            return max(near, key=lambda h: h.score, default=None)
+        each = [max(of_kind(own), key=lambda h: h.score, default=None) for own in finding.alone]
+        parts = [h for h in each if h is not None]
+        score = sum(h.score for h in parts)
+        whole = {j for h in parts for j in h.joints} == set(finding.joints)
+        if not whole or score < share * sum(own.score for own in finding.alone):
+            return None
+        return replace(
+            parts[0],
+            candidates=tuple(c for h in parts for c in h.candidates),
+            gain=np.sum([h.gain for h in parts], axis=0),
+            score=score,
+            n_parameters=sum(h.n_parameters for h in parts),
+            errors=None,
+        )
 
     def withdraw(self, newest: Hypothesis | None = None) -> Hypothesis | None:
         """Withdraw findings that are no longer valid in presence of later ones.

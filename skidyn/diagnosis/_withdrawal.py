@@ -50,7 +50,7 @@ from skidyn.effects import Term, get_effect
 from skidyn.evidence import Problem
 
 #: What is said of findings that are not listed.
-UNLISTED = "It is not counted as a finding; the errors stated here are those without it."
+UNLISTED = "It is not counted as a finding."
 #: Terms of one finding that are to be withdrawn.
 Withdrawal = tuple[Hypothesis, list[Candidate]]
 

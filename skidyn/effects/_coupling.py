@@ -224,7 +224,7 @@ class CouplingSpring(_PairEffect):
     title = "Coupling spring"
     formula = r"k\,(q_i + r\,q_j - x_0)^p"
     coefficients = (
-        Coefficient("k", "N m/rad"),
+        Coefficient("k", "N m/rad", sign=1),
         Coefficient("dk", "N m/rad"),
         Coefficient("k3", "N m/rad^3", sign=1),  # what softens, as a cosine, has forms of its own
         Coefficient("tau0", "N m", is_zero=True),

@@ -301,7 +301,7 @@ class LuGre(PathMemory):
             0.5,
             limit_kind="coulomb",
         ),
-        Shape("vs", "rad/s", (0.05, 0.1, 0.16), 0.01, 1.0),
+        Shape("vs", "rad/s", (0.05, 0.1, 0.16, 0.25), 0.01, 1.0),
     )
     family = "hysteresis"
     simplicity = 25

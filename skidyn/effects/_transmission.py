@@ -287,7 +287,7 @@ class JointElasticity(_LinkSideEffect):
         Shape(
             "resonance",
             "Hz",
-            (100.0, 50.0, 25.0, 18.0, 13.0, 9.5, 7.0, 5.0, 3.5),
+            (100.0, 50.0, 25.0, 18.0, 13.0, 9.5, 7.0, 5.0, 3.5, 2.5, 1.8),
             1.0,
             100.0,
             scales=False,
