@@ -360,7 +360,7 @@ class JointElasticity(_LinkSideEffect):
 
 
 #: Resonances, Hz, without load with which the search for a gear that becomes stiffer starts.
-SOFT_RESONANCES = (30.0, 10.0)
+SOFT_RESONANCES = (30.0, 10.0, 4.0)
 #: Least load from which a gear becomes stiffer, as a share of the largest load.
 LEAST_STIFFENING = 0.02
 

@@ -41,6 +41,20 @@ def test_a_wave_that_may_be_absent_has_an_amplitude_from_zero(missing):
         assert value < high - value
 
 
+def test_what_acts_in_one_recording_is_judged_by_parts_of_it(complete_log):
+    log = complete_log
+    highest = log.X.groupby("trajectory")["q1"].max().sort_values()
+    limit = float(highest.iloc[-2:].mean())  # one recording goes beyond
+    y = np.array(log.y)
+    y[:, 0] += 500 * np.maximum(log.X["q1"].to_numpy() - limit, 0)
+    problem = diagnose(RBDRegressor(log.robot), log.X, y, checks=(), effects=[]).problem
+    stop = Term("end_stop", (1,), {"q_lim": limit, "side": 1.0})
+    terms = [*problem.terms, stop]
+    noise = problem.fit(terms).noise
+    value, low, high = parameter_intervals(problem, terms, noise)[stop]["k"]
+    assert 0 < low < 500 < high < 2 * value
+
+
 @pytest.mark.slow
 def test_a_fine_ripple_has_narrow_intervals_of_its_waves_and_size():
     # a wave of 60 periods per rad is another one at waves that differ by two per cent

@@ -186,3 +186,9 @@ def test_the_power_of_an_inertia_behind_a_lever_is_the_change_of_its_energy(sign
     for rows in signals.segments:
         change = np.gradient(energy[rows], signals.clock[rows])
         np.testing.assert_allclose(power[rows][2:-2], change[2:-2], atol=0.02 * np.ptp(change))
+
+
+@pytest.mark.parametrize("form", [{}, {"x0": 0.0, "bent": 1.0}, {"x0": 0.0, "softening": 0.4}])
+def test_a_spring_between_joints_does_not_push_them_away_from_where_it_is_slack(form):
+    stiffness = get_effect("coupling_spring").coefficients_of({"ratio": -1.0, **form})[0]
+    assert (stiffness.name, stiffness.sign) == ("k", 1)
