@@ -139,7 +139,10 @@ class ReconsideringSearch(DuellingSearch):
         return (best, ()) if second is None else (first, second.candidates)
 
     def _offset_later(self, step: Hypothesis) -> Hypothesis:
-        """A step in time between two recordings, as an offset of the later ones."""
+        """A step in time, as an offset of the rest of its recording and of the later ones.
+
+        With clocks that start anew, a step in several recordings remains without a name.
+        """
         signals, kind = self.problem.signals, "offset"
         if step.kind != UNKNOWN or kind not in self.kinds:
             return step
@@ -150,11 +153,16 @@ class ReconsideringSearch(DuellingSearch):
             if moment is None:
                 return step
             share = np.bincount(number, signals.clock >= moment) / rows
-            if (np.minimum(share, 1 - share) > BETWEEN).any():
-                return step  # within a recording
+            within = names[np.minimum(share, 1 - share) > BETWEEN].tolist()
             later = tuple(map(int, names[share > BETWEEN]))
-            term = Term.at(kind, c.term.places, {"trajectories": later})
-            candidates.append(Candidate(kind, term, c.rows))
+            if len(within) > 1:
+                return step
+            end = [float(signals.clock[signals.trajectory == name].max()) for name in within]
+            spans = tuple((int(n), float(moment), e) for n, e in zip(within, end, strict=True))
+            shape = {"trajectories": later} | ({"spans": spans} if spans else {})
+            term = Term.at(kind, c.term.places, shape)
+            rows_of_term = self.problem.term_rows(term) if spans else c.rows
+            candidates.append(Candidate(kind, term, rows_of_term))
         return replace(step, kind=kind, candidates=tuple(candidates))
 
     def _first_of_two_names(
