@@ -83,5 +83,5 @@ def test_a_gear_that_stiffens_only_beyond_all_loads_is_a_spring(signals, robot):
     effect = get_effect("joint_elasticity")
     largest = np.abs(motor.load[:, 1]).max()
 
-    assert sum("stiffening" in shape for shape in effect.grid(motor, [1])) == 2
+    assert sum("stiffening" in shape for shape in effect.grid(motor, [1])) == 3
     assert not effect.admissible(motor, [1], {"resonance": 10.0, "stiffening": 1.1 * largest})
