@@ -34,6 +34,7 @@ from skidyn.diagnosis._hypothesis import (
     SearchResult,
     found_terms,
 )
+from skidyn.diagnosis._imitation import coarse_joints
 from skidyn.diagnosis._intervals import parameter_intervals
 from skidyn.diagnosis._judged import Judged, worth_their_terms
 from skidyn.diagnosis._limits import Limit
@@ -152,13 +153,20 @@ def conclude(
         unknowns,
         parts=parts,
     )
-    wrong = guess(diagnosis)
+    # Noise of positions makes a link seem soft.
+    seem_soft = [
+        f
+        for f in findings
+        if any(term.effect.moves_link for term in f.terms)
+        and coarse_joints(problem, result.fit, judged.residual) & {j - 1 for j in f.joints}
+    ]
+    wrong = guess(diagnosis, seem_soft)
     if wrong is None:
         return diagnosis
     rest = without(problem, result, *wrong)
     other = again(problem, rest, limits, sliding, torque, notes)
     # "Nothing is missing" would be wrong: something is, and this is the most likely name.
-    only = len(result.findings) == 1 and other.verdict == "complete"
+    only = len(result.findings) == 1 and other.verdict == "complete" and not seem_soft
     return diagnosis if only and max(f.error_drop for f in findings) > MUCH else other
 
 

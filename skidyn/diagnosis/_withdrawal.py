@@ -302,7 +302,7 @@ def _in_the_noise(hypothesis: Hypothesis, errors: Sequence[float]) -> bool:
     return all(root_mean_square(waves[:, j]) < errors[j] for j in hypothesis.joints)
 
 
-def guess(diagnosis: Diagnosis) -> Withdrawal | None:
+def guess(diagnosis: Diagnosis, seem_soft: Sequence[Finding] = ()) -> Withdrawal | None:
     """The last finding with terms that are more likely wrong than right, and these terms.
 
     If an explanation of much of an error on other joints, or another one on the same joints, is
@@ -312,7 +312,8 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
     itself, and one that removes very little needs a high confidence. An effect whose
     times were chosen has to be constant within them: otherwise they only show where the error of
     another effect is large. One that another formula of another finding would explain has to be
-    likely by itself.
+    likely by itself, as has one that moves a link whose positions are mostly noise (``seem_soft``):
+    they make it seem soft, which is significant.
     """
 
     def is_sure(finding: Finding) -> bool:
@@ -330,7 +331,8 @@ def guess(diagnosis: Diagnosis) -> Withdrawal | None:
             # of samples, of which most is noise, or of averaged rows
             drop = max([drop, *(f.averaged_drop or 0.0 for f in of_kind)])
         if drop >= MUCH:
-            if finding.kind != UNKNOWN:
+            soft = any(finding is f for f in seem_soft)
+            if finding.kind != UNKNOWN and not soft:
                 likely = of_significant(likely, min(f.q_value or 0.0 for f in of_kind))
             equalled = bool(finding.rivals) and finding.margin < ABOVE
             likely *= (1 + finding.alike + equalled) * (1 + len(finding.elsewhere))
