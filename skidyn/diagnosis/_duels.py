@@ -15,13 +15,14 @@ from skidyn.diagnosis._confidence import SEPARATES
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
+    family_of,
     margin_over,
     on_pairs,
     on_single_joints,
     ranked_with,
     rivals_among,
 )
-from skidyn.diagnosis._rule import COMPARABLE
+from skidyn.diagnosis._rule import COMPARABLE, NEARLY
 from skidyn.effects import get_effect
 
 
@@ -135,3 +136,87 @@ class DuellingSearch(JudgingSearch):
             return []
         ranking = self._finals([[c] for c in (candidate, *near)], refined=len(near) + 1)
         return sorted(ranking, key=lambda h: -h.score)
+
+    def name_alike(self) -> None:
+        """Use the kind of another joint if it explains nearly as much.
+
+        Joints of one robot have the same design: an effect of one of them is more likely on another
+        than a different effect that looks like it. If either kind is possible for both, the one
+        that explains more is used for both. Members of a family differ in the formula only: one is
+        used for all joints on which together it explains nearly as much.
+        """
+        for old in list(self.findings):
+            if old.kind == UNKNOWN or get_effect(old.kind).is_exact:
+                continue  # an exact formula that explains equally much is right
+            for other in list(self.findings):
+                if old is other or not all(map(on_single_joints, (old, other))):
+                    continue
+                same = self._in_kind_of(old, other)
+                if same is None:
+                    continue
+                place = self.findings.index(old)
+                self.chosen = [c for c in self.chosen if c not in old.candidates]
+                judged = self.judged(same)
+                if judged is None or judged.joints != old.joints:
+                    self.chosen += old.candidates
+                    continue
+                # members of a family are no rivals
+                related = family_of(old) == family_of(same) != ""
+                margin = old.margin if related else max(0.0, 1 - old.score / same.score)
+                new = ranked_with(replace(judged, margin=margin), [old, *old.others])
+                self.chosen += new.candidates
+                self.findings[place] = new
+                self.refit()
+                self.sigma = self.weights()
+                break
+
+    def _in_kind_of(self, old: Hypothesis, other: Hypothesis) -> Hypothesis | None:
+        """A finding in the kind of another one on other joints, if it should have this kind."""
+        if set(old.joints) & set(other.joints) or old.kind == other.kind:
+            return None
+        same, reverse = self._also(old, other), self._also(other, old)
+        if same is None:
+            return None
+        if family_of(old) == family_of(other) != "":
+            better = reverse is not None and reverse.score + old.score > same.score + other.score
+            return None if better else same
+        designed = all(self.same_design(c, other.candidates) for c in old.candidates)
+        better = reverse is not None and old.score > other.score
+        return same if designed and not better else None
+
+    def _also(self, finding: Hypothesis, other: Hypothesis) -> Hypothesis | None:
+        """The kind of another finding on the joints of one, if it explains nearly as much.
+
+        Members of a family differ little, and are rivals of each other in any case: all their
+        joints together count.
+        """
+        kind = other.kind
+        alike = family_of(other) == family_of(finding) != ""
+        share = NEARLY if alike else 1 - self.settings.simpler_share
+        given = other.score if alike else 0.0
+
+        def of_kind(own: Hypothesis) -> list[Hypothesis]:
+            return [h for h in own.others if h.kind == kind and h.joints == own.joints]
+
+        def enough(score: float, own: float) -> bool:
+            return score + given >= share * (own + given)
+
+        # a term that was found together with those of other joints was compared alone
+        same = [own for own in finding.alone if own.joints == finding.joints]
+        near = [h for own in (finding, *same) for h in of_kind(own) if enough(h.score, own.score)]
+        if near or len(finding.joints) == 1:
+            return max(near, key=lambda h: h.score, default=None)
+        each = [max(of_kind(own), key=lambda h: h.score, default=None) for own in finding.alone]
+        parts = [h for h in each if h is not None]
+        score = sum(h.score for h in parts)
+        whole = {j for h in parts for j in h.joints} == set(finding.joints)
+        if not whole or not enough(score, sum(own.score for own in finding.alone)):
+            return None
+        return replace(
+            parts[0],
+            candidates=tuple(c for h in parts for c in h.candidates),
+            gain=np.sum([h.gain for h in parts], axis=0),
+            score=score,
+            n_parameters=sum(h.n_parameters for h in parts),
+            errors=None,
+        )

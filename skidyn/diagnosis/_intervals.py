@@ -51,13 +51,12 @@ def _products_of_quarters(
     problem: Problem, design: Sequence[Array], sigma: Array
 ) -> tuple[Array, Array]:
     """As :func:`fold_products`, of interleaved parts of all recordings."""
-    quarter, target = problem.rows.quarter, problem.target
+    quarter = problem.rows.quarter
     orders = [np.argsort(own, kind="stable") for own in quarter]
-    sorted_rows = (
-        [x[order] for x, order in zip(of, orders, strict=True)] for of in (quarter, design, target)
-    )
-    fold, columns, torque = sorted_rows
-    return fold_products(_Quarters(fold), columns, sigma, torque)
+    columns = [block[order] for block, order in zip(design, orders, strict=True)]
+    torque = [y[order] for y, order in zip(problem.target, orders, strict=True)]
+    parts = _Quarters([own[order] for own, order in zip(quarter, orders, strict=True)])
+    return fold_products(parts, columns, sigma, torque)
 
 
 def parameter_intervals(

@@ -19,7 +19,6 @@ from skidyn.diagnosis._hypothesis import (
     family_of,
     grouped_by_joints,
     margin_over,
-    on_single_joints,
     ranked_with,
     rivals_among,
     some_recordings,
@@ -32,7 +31,7 @@ from skidyn.diagnosis._remainder import noise_level
 from skidyn.diagnosis._rule import BETWEEN, IN_MOST, NEARLY, REMAINDER_TIMES_NOISE
 from skidyn.diagnosis._search_state import still_free
 from skidyn.diagnosis._split import recordings_with
-from skidyn.effects import Term, get_effect
+from skidyn.effects import Term
 
 #: Effects with another size in most recordings that are one of all of them, which changes.
 PLAIN = (*FRICTION, "offset")
@@ -430,74 +429,6 @@ class ReconsideringSearch(DuellingSearch):
                         return self.judged(found)
             self._restore(kept)
         return None
-
-    def name_alike(self) -> None:
-        """Use the kind of another joint if it explains nearly as much.
-
-        Joints of one robot have the same design: an effect of one of them is more likely on another
-        than a different effect that looks like it. If either kind is possible for both, the one
-        that explains more is used for both.
-        """
-        for old in list(self.findings):
-            if old.kind == UNKNOWN or get_effect(old.kind).is_exact:
-                continue  # an exact formula that explains equally much is right
-            for other in list(self.findings):
-                if old is other or not all(map(on_single_joints, (old, other))):
-                    continue
-                both = self._also(other, old.kind) is not None
-                if set(old.joints) & set(other.joints) or (both and old.score > other.score):
-                    continue
-                if not all(self.same_design(c, other.candidates) for c in old.candidates):
-                    continue
-                same = self._also(old, other.kind)
-                if same is None or same.kind == old.kind:
-                    continue
-                place = self.findings.index(old)
-                self.chosen = [c for c in self.chosen if c not in old.candidates]
-                judged = self.judged(same)
-                if judged is None or judged.joints != old.joints:
-                    self.chosen += old.candidates
-                    continue
-                # members of a family are no rivals
-                related = family_of(old) == family_of(same) != ""
-                margin = old.margin if related else max(0.0, 1 - old.score / same.score)
-                new = ranked_with(replace(judged, margin=margin), [old, *old.others])
-                self.chosen += new.candidates
-                self.findings[place] = new
-                self.refit()
-                self.sigma = self.weights()
-                break
-
-    def _also(self, finding: Hypothesis, kind: str) -> Hypothesis | None:
-        """Another kind on the same joints that explains nearly as much as a finding.
-
-        Members of a family differ little, and are rivals of each other in any case.
-        """
-        alike = get_effect(kind).family == family_of(finding) != ""
-        share = NEARLY if alike else 1 - self.settings.simpler_share
-
-        def of_kind(own: Hypothesis) -> list[Hypothesis]:
-            return [h for h in own.others if h.kind == kind and h.joints == own.joints]
-
-        # a term that was found together with those of other joints was compared alone
-        same = [own for own in finding.alone if own.joints == finding.joints]
-        near = [h for own in (finding, *same) for h in of_kind(own) if h.score >= share * own.score]
-        if near or len(finding.joints) == 1:
-            return max(near, key=lambda h: h.score, default=None)
-        each = [max(of_kind(own), key=lambda h: h.score, default=None) for own in finding.alone]
-        parts = [h for h in each if h is not None]
-        score = sum(h.score for h in parts)
-        whole = {j for h in parts for j in h.joints} == set(finding.joints)
-        if not whole or score < share * sum(own.score for own in finding.alone):
-            return None
-        return replace(
-            parts[0],
-            candidates=tuple(c for h in parts for c in h.candidates),
-            gain=np.sum([h.gain for h in parts], axis=0),
-            score=score,
-            n_parameters=sum(h.n_parameters for h in parts),
-            errors=None,
-        )
 
     def withdraw(self, newest: Hypothesis | None = None) -> Hypothesis | None:
         """Withdraw findings that are no longer valid in presence of later ones.

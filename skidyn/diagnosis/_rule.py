@@ -117,7 +117,7 @@ FRICTION_SHARE = 0.5
 STANDS_OUT = 4.0
 #: Share of the best score from which other forms of another kind are tried, another pair of joints
 #: of a coupling is told with the best one, and another kind may replace a finding beside a later
-#: one (``_ranking.py``, ``_acceptance.py``, ``_reconsideration.py``).
+#: one (``_ranking.py``, ``_acceptance.py``, ``_duels.py``, ``_reconsideration.py``).
 NEARLY = 0.9
 #: Share of what an effect removes alone on a joint, on the grid of its shapes, from which another
 #: one is compared with it there (``_duels.py``).
