@@ -52,9 +52,10 @@ def absorbed_directions(problem: Problem, terms: Iterable[Term], sigma: Array) -
     whitened = vectors[:, kept] / np.sqrt(values[kept])
     found = []
     for columns in design:
-        left, share, _ = np.linalg.svd(columns @ whitened, full_matrices=False)
-        taken = share**2 > LITTLE
-        found.append(left[:, taken] * share[taken])
+        # By the products of few columns; LAPACK's singular values of all rows may not converge.
+        own = columns @ whitened
+        share, directions = np.linalg.eigh(own.T @ own)
+        found.append(own @ directions[:, share > LITTLE])
     return found
 
 
