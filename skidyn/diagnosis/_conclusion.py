@@ -114,15 +114,7 @@ def conclude(
         remarks.append(remark)
     unknowns = _unknowns(problem, result, judged.terms)
     findings, unlisted = _listed(judged, shown, unknowns)
-    again = partial(conclude, settings=settings, model=model, data=data, withdrawn=True)
-    for k, hypothesis in enumerate(result.findings):
-        terms = [c for c in hypothesis.candidates if c.term in unlisted]
-        drops = [drop_of(shown[k], shown[k + 1], tuple(c.rows)) for c in terms]
-        if terms and hypothesis.torque is None and max(drops) > MUCH:
-            # What it removes is part of the error, though its name is uncertain.
-            rest, notes = without(problem, result, hypothesis, terms), [*notes, *unlisted.values()]
-            return again(problem, rest, limits, sliding, torque, notes)
-    remarks += dict.fromkeys(unlisted.values())
+    remarks += unlisted
     share = predictable_share(problem, result.fit.residual)
     rmse = np.array(judged.history[-1]["rmse"])
     parts = find_remainder(problem, result.fit, judged.noise, judged.comparisons[-1], share)
@@ -153,18 +145,12 @@ def conclude(
         unknowns,
         parts=parts,
     )
-    # Noise of positions makes a link seem soft.
-    seem_soft = [
-        f
-        for f in findings
-        if any(term.effect.moves_link for term in f.terms)
-        and coarse_joints(problem, result.fit, judged.residual) & {j - 1 for j in f.joints}
-    ]
+    seem_soft = _seem_soft(judged, findings)
     wrong = guess(diagnosis, seem_soft)
     if wrong is None:
         return diagnosis
     rest = without(problem, result, *wrong)
-    other = again(problem, rest, limits, sliding, torque, notes)
+    other = conclude(problem, rest, limits, sliding, torque, notes, settings, model, data, True)
     # "Nothing is missing" would be wrong: something is, and this is the most likely name.
     only = len(result.findings) == 1 and other.verdict == "complete" and not seem_soft
     return diagnosis if only and max(f.error_drop for f in findings) > MUCH else other
@@ -172,7 +158,7 @@ def conclude(
 
 def _listed(
     judged: Judged, shown: Sequence[Any], unknowns: Sequence[UnknownTorque]
-) -> tuple[list[Finding], dict[Term, str]]:
+) -> tuple[list[Finding], list[str]]:
     """Findings, one for every term, and remarks on those that are too small to be listed."""
     problem, result = judged.problem, judged.result
     intervals = parameter_intervals(problem, judged.terms, result.fit.noise)
@@ -197,7 +183,16 @@ def _listed(
             )
             finding.curves.extend(curves)
             findings.append(finding)
-    return findings, unlisted
+    return findings, list(dict.fromkeys(unlisted.values()))
+
+
+def _seem_soft(judged: Judged, findings: Sequence[Finding]) -> list[Finding]:
+    """Findings that move a link whose positions are mostly noise, which makes it seem soft."""
+    moving = [f for f in findings if any(term.effect.moves_link for term in f.terms)]
+    if not moving:
+        return []
+    coarse = coarse_joints(judged.problem, judged.result.fit, judged.residual)
+    return [f for f in moving if coarse & {j - 1 for j in f.joints}]
 
 
 def _in_time(

@@ -187,7 +187,7 @@ def _vague(
         terms = []
         for candidate in hypothesis.candidates:
             if folds_alone(problem, candidate.term).any():
-                continue  # without the fold that determines it, its value is arbitrary
+                continue  # parts of all recordings judged it when it was accepted
             effect = candidate.term.effect
             sizes = [c for c in effect.coefficients if not c.is_zero]
             if len(sizes) > 1:
@@ -314,6 +314,13 @@ def guess(diagnosis: Diagnosis, seem_soft: Sequence[Finding] = ()) -> Withdrawal
     another effect is large. One that another formula of another finding would explain has to be
     likely by itself, as has one that moves a link whose positions are mostly noise (``seem_soft``):
     they make it seem soft, which is significant.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        The diagnosis with all findings.
+    seem_soft : sequence of Finding, default=()
+        Findings of it that move such a link.
     """
 
     def is_sure(finding: Finding) -> bool:
