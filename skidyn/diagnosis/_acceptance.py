@@ -15,10 +15,10 @@ from skidyn.diagnosis._confidence import SEPARATES
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
-    family_of,
     grouped_by_joints,
     in_part,
     is_plain_friction,
+    of_one_family,
     on_pairs,
     removed_share,
     simplicity_of,
@@ -388,10 +388,8 @@ class JudgingSearch(ChoosingSearch):
 
     def _richer_known(self, hypothesis: Hypothesis) -> bool:
         """Whether an equally complex member of the family was found on the same joints."""
-        family = family_of(hypothesis)
         return any(
-            family
-            and family_of(h) == family
+            of_one_family(hypothesis, h)
             and set(hypothesis.joints) <= set(h.joints)
             and simplicity_of(h) >= simplicity_of(hypothesis)
             for h in self.findings

@@ -242,9 +242,11 @@ class ChoosingSearch(RankingSearch):
             errors = rival.errors
             if errors.shape != best.errors.shape:
                 errors = self._errors(rival, within=single)
-            left_over = self.settings.further_tolerance if rival.is_further_form else None
+            left_over: float | None = None
             if family_of(rival):
-                left_over = 1 - self.settings.family_share
+                left_over = 1 - self.settings.family_share  # as between its members
+            elif rival.is_further_form:
+                left_over = self.settings.further_tolerance
             if self._good_enough(errors.sum(0), left, removed, joints, left_over):
                 return rival
         return best

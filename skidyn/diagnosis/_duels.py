@@ -15,8 +15,8 @@ from skidyn.diagnosis._confidence import SEPARATES
 from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
-    family_of,
     margin_over,
+    of_one_family,
     on_pairs,
     on_single_joints,
     ranked_with,
@@ -161,8 +161,8 @@ class DuellingSearch(JudgingSearch):
                     self.chosen += old.candidates
                     continue
                 # members of a family are no rivals
-                related = family_of(old) == family_of(same) != ""
-                margin = old.margin if related else max(0.0, 1 - old.score / same.score)
+                further = max(0.0, 1 - old.score / same.score)
+                margin = old.margin if of_one_family(old, same) else further
                 new = ranked_with(replace(judged, margin=margin), [old, *old.others])
                 self.chosen += new.candidates
                 self.findings[place] = new
@@ -177,12 +177,15 @@ class DuellingSearch(JudgingSearch):
         same, reverse = self._also(old, other), self._also(other, old)
         if same is None:
             return None
-        if family_of(old) == family_of(other) != "":
-            better = reverse is not None and reverse.score + old.score > same.score + other.score
-            return None if better else same
-        designed = all(self.same_design(c, other.candidates) for c in old.candidates)
-        better = reverse is not None and old.score > other.score
-        return same if designed and not better else None
+        related = of_one_family(old, other)
+        if not related and not all(self.same_design(c, other.candidates) for c in old.candidates):
+            return None
+        if reverse is None:
+            return same
+        in_own, in_other = old.score, other.score
+        if related:
+            in_own, in_other = old.score + reverse.score, other.score + same.score
+        return None if in_own > in_other else same
 
     def _also(self, finding: Hypothesis, other: Hypothesis) -> Hypothesis | None:
         """The kind of another finding on the joints of one, if it explains nearly as much.
@@ -191,7 +194,7 @@ class DuellingSearch(JudgingSearch):
         joints together count.
         """
         kind = other.kind
-        alike = family_of(other) == family_of(finding) != ""
+        alike = of_one_family(finding, other)
         share = NEARLY if alike else 1 - self.settings.simpler_share
         given = other.score if alike else 0.0
 

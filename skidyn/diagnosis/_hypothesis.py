@@ -185,13 +185,12 @@ def on_samples(term: Term) -> bool:
 def rivals_among(best: Hypothesis, ranking: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Other explanations of the same joints, except members of the same family."""
     own = set(best.joints)
-    family = family_of(best)
     return [
         h
         for h in ranking
         if h.kind != best.kind
         and own & set(h.joints)
-        and (not family or family_of(h) != family)
+        and not of_one_family(best, h)
         # Errors of single recordings are smaller.
         and (within_recordings(best) or not within_recordings(h))
         and not is_vibration(h)
@@ -251,6 +250,11 @@ def removed_share(gain: Array, counts: NDArray[np.int64]) -> Array:
 def family_of(hypothesis: Hypothesis) -> str:
     """Family of its kind, empty for none."""
     return "" if hypothesis.kind == UNKNOWN else get_effect(hypothesis.kind).family
+
+
+def of_one_family(one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether the kinds of two explanations are members of one family."""
+    return family_of(one) == family_of(other) != ""
 
 
 def simplicity_of(hypothesis: Hypothesis) -> int:

@@ -5,7 +5,8 @@ The jackknife over whole trajectories (Efron, Stein 1981, Ann. Stat. 9) is valid
 autocorrelation within a trajectory. Shape parameters are included through the derivative of the
 effect's torque (one Gauss-Newton step from the fitted value in every fold), limited to the spacing
 of the grid on which they were found: along a direction that the data does not determine, a linear
-step could be arbitrarily large.
+step could be arbitrarily large. What acts in one fold only is judged by leaving out interleaved
+parts of all recordings, since the other folds do not determine it.
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ def parameter_intervals(
     grams, cross = fold_products(problem, design, sigma, problem.target)
     stay = bases_alone(grams, terms, len(spread))
     full, left_out = solve_left_out(grams, cross, prior, kept=stay)
-    # What acts in one fold only is judged by parts of all of them (``_acceptance.py``).
+    # As when it was accepted (``SearchState.is_judged_within``).
     confined = [t.trajectories is None and folds_alone(problem, t).any() for t in terms]
     if any(confined):
         _, in_parts = solve_left_out(*_products_of_quarters(problem, design, sigma), prior)

@@ -16,9 +16,9 @@ from skidyn.diagnosis._hypothesis import (
     UNKNOWN,
     Hypothesis,
     close_shapes,
-    family_of,
     grouped_by_joints,
     margin_over,
+    of_one_family,
     ranked_with,
     rivals_among,
     some_recordings,
@@ -437,8 +437,8 @@ class ReconsideringSearch(DuellingSearch):
         """
         for old in [h for h in self.findings if h is not newest and h.torque is None]:
             without = [c for c in self.chosen if c not in old.candidates]
-            richer = newest is not None and family_of(old) == family_of(newest) != ""
-            if richer and newest is not None and old.joints == newest.joints:
+            related = newest is not None and of_one_family(old, newest)
+            if newest is not None and related and old.joints == newest.joints:
                 # A more complex member of the family replaces the simpler one.
                 self._replace(old, (), without)
                 newest = self._refined_anew(newest)

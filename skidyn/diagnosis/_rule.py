@@ -284,7 +284,7 @@ class Settings:
         A simpler kind is preferred if its score is lower by less than this share.
     family_share : float
         Within a family of effects (hysteresis), the simplest one with this share of the best score
-        is preferred.
+        is preferred; and a member that removes this share of what an unknown function does.
     ripple_share : float
         Torque ripple must reach this share of the score of a function of the signals on averaged
         rows.

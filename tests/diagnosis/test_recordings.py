@@ -85,6 +85,19 @@ def test_an_offset_that_comes_and_goes_in_every_recording_is_no_offset(log):
     assert {kind for kind, _ in found(log, torque)} == {"unknown"}
 
 
+def test_a_step_within_a_recording_is_an_offset_of_the_rest_of_the_log(log):
+    torque, time = np.array(log.y), log.X["time"].to_numpy()
+    middle = time[log.X["trajectory"] == 6].mean()
+    torque[time > middle, 1] += 0.5 * np.std(torque[:, 1])
+
+    (offset,) = diagnose(RBDRegressor(log.robot), log.X, torque, checks=()).findings
+
+    assert (offset.kind, offset.joints) == ("offset", (2,))
+    assert offset.trajectories == tuple(range(6, 11))
+    ((first, start, _),) = offset.terms[0].spans
+    assert first == 6 and start == pytest.approx(middle, abs=0.2)
+
+
 @pytest.mark.slow
 def test_an_offset_from_a_recording_on_is_one_of_the_later_recordings():
     log = make_hidden_effect_log(
